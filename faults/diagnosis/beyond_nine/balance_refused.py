@@ -10,7 +10,8 @@ import numpy as np
 
 from estimation.eha.result import BulkModulusEstimate
 from estimation.notes import EstimateCode
-from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, STUCK, WORN, gains_of_other_circuits
+from faults.diagnosis.beyond_nine.faulty_circuits import STUCK, WORN
+from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, gains_of_other_circuits
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks

@@ -14,13 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from faults.conditions import CONDITIONS
+from faults.diagnosis.beyond_nine.faulty_circuits import (
+    EARLY,
+    HOPELESS,
+    STUCK,
+    WORN,
+    Fault,
+    delivery_note,
+    fits_with_faults,
+)
 from faults.diagnosis.beyond_nine.left_open import (
     DELIVERIES,
     LEAST_REPORTED,
     STUCK_VALVE_PRIOR,
     OpenFault,
-    delivery_log_priors,
     fault_probabilities,
     hidden_relief_log_prior,
     not_excluded_notes,
@@ -29,13 +36,9 @@ from faults.diagnosis.beyond_nine.left_open import (
 from faults.diagnosis.beyond_nine.sound_circuit import Trial, largest_pressure, log_likelihood, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.circuit_runs import COORDINATES
-from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, LASTING, misfit, nominal_runs
+from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, nominal_runs
 from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE, ClassFits, fit_classes, is_stuck
-from faults.notes import AgainstCode
 from plant.arrays import Array
-from plant.eha.circuit_parameters import CircuitParameters
-from plant.eha.one_sided import with_make_up_faults
 from plant.notes import Note
 
 GAIN = 4.0
@@ -44,23 +47,6 @@ GAIN = 4.0
 
 NOT_EXCLUDED = -3.0
 """The same, from which a fault is not excluded [dimensionless]: a Bayes factor of a twentieth."""
-
-HOPELESS = 20.0
-"""Log-likelihood below the sound circuit at which a search leaves a fault [dimensionless]: it ends where the steps that
-are left would not bring it to that."""
-
-THOROUGH = 8.0
-"""The same from which a worn pump is searched roughly alone [dimensionless]: where rough searches ended lower, six
-thorough ones in five logs gained 0.2 at most. Long ago some gained up to 26, but few."""
-
-WORN = "a worn pump"
-"""Name of that fault."""
-
-EARLY = "a relief valve that opens early"
-"""Name of that fault."""
-
-STUCK = "a make-up valve that is stuck shut"
-"""Name of that fault. A valve that never has to open leaves no trace."""
 
 UNSEEN_STUCK_ODDS = math.log(STUCK_VALVE_PRIOR / (1.0 - STUCK_VALVE_PRIOR))
 """Prior log-odds of a stuck valve if the log does not show it [dimensionless]: as with pressure."""
@@ -72,21 +58,6 @@ BELIEVED_ODDS = 10.0
 """How many times likelier than a sound pump a well worn one must be to be believed [dimensionless]: evidence is called
 strong above that (Jeffreys, Theory of Probability, 1961, appendix B). In 16 sound training logs under major leakage and
 friction none exceeds 1.4."""
-
-SHUT_SHARES = (0.9, 0.97, 0.99, 1.0)
-"""Shares of a make-up valve that are blocked [dimensionless]: one that passes a little oil looks like friction beside
-one that passes none. A search finds no more than its neighbours."""
-
-SEAT_LEAKAGES = (0.4, 1.0)
-"""Leakage past the seat of a make-up valve, over the whole leakage of an actuator with major leakage
-[dimensionless]."""
-
-SETTINGS = (0.75, 0.9)
-"""Settings of a relief valve, over the largest pressure of the sound circuit in the log [dimensionless]."""
-
-SETTING_LOG_PRIOR = math.log(math.log(SETTINGS[1] / SETTINGS[0]) / math.log(10.0))
-"""Prior log-probability of such a setting [dimensionless]: it may be as low as a tenth of the right one, below which no
-piston slides, and each of `SETTINGS` stands for those near it."""
 
 SETTING_SPREAD = 0.1
 """Deviation of the logarithm of a relief valve's setting, judged [dimensionless]: one sound about the rig file's, and
@@ -115,38 +86,21 @@ class OutsideFaults(NamedTuple):
     faulty: float = 0.0
 
 
-@dataclass(frozen=True)
-class _Fault:
-    """A fault: its note if found, its name if not excluded, and a circuit with it.
-
-    The search for one that moves the log into another condition begins in that, any other at the sound circuit.
-    What is presumed is the log-likelihood of its size before a log is seen, and beyond `GAIN` it must gain what
-    `odds_of_wear` presumes of a pump [dimensionless].
-    """
-
-    note: Note
-    name: str
-    circuit: CircuitParameters
-    in_another_condition: bool = False
-    log_prior: float = 0.0
-    extra_gain: float = 0.0
-
-
 @dataclass(frozen=True, eq=False)
 class _FaultyCircuits:
     """Circuits with faults beside the best sound one: what each gains over it in explaining a log."""
 
     blocks: Blocks
-    faulty: tuple[tuple[_Fault, Trial], ...]
+    faulty: tuple[tuple[Fault, Trial], ...]
     sound: Trial
 
-    def gain(self, fault: _Fault, tried: Trial) -> float:
+    def gain(self, fault: Fault, tried: Trial) -> float:
         """Return the log-likelihood that a fault gains, with the prior of its size [dimensionless]."""
         gain = log_likelihood(self.blocks, tried) - log_likelihood(self.blocks, self.sound)
         return gain + fault.log_prior + _scale_gain(self.blocks, tried, self.sound)
 
     @property
-    def leading(self) -> tuple[_Fault, Trial]:
+    def leading(self) -> tuple[Fault, Trial]:
         """The fault that gains most, and its circuit."""
         return max(self.faulty, key=lambda one: self.gain(*one) - one[0].extra_gain)
 
@@ -167,7 +121,7 @@ class _FaultyCircuits:
         if self.gain(fault, tried) - fault.extra_gain > GAIN:
             return fault.note
         worn = self.wear_log_odds > math.log(BELIEVED_ODDS)
-        return _delivery_note(DELIVERIES[int(np.argmax(self.delivery_scores))]) if worn else None
+        return delivery_note(DELIVERIES[int(np.argmax(self.delivery_scores))]) if worn else None
 
 
 def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> OutsideFaults:
@@ -191,38 +145,10 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
         return OutsideFaults()
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
-    beside = _FaultyCircuits(blocks, tuple(_fits_with_faults(blocks, sound, runs)), sound)
-    asked = list[_Fault]()
-    while beside.shown_fault is not None and (leading := beside.leading)[0] not in asked:
-        # a search may end short of the best: the sound circuit is searched again from the faulty one, and once anew
-        starts = (leading[1].fits.best.coordinates, *(() if asked else (None,)))
-        again = [Trial(sound.actuator, fit_classes(blocks, sound.actuator, runs=runs, start=start)) for start in starts]
-        beside = replace(beside, sound=max([beside.sound, *again], key=lambda one: log_likelihood(blocks, one)))
-        asked.append(leading[0])
-    if (shown := beside.shown_fault) is not None:
-        return OutsideFaults((shown,))
-    sound, gains, likeliest, wear = beside.sound, dict[str, float](), dict[str, Array](), beside.wear_log_odds
-    for fault, tried in beside.faulty:
-        gain = beside.gain(fault, tried)
-        if gain >= gains.get(fault.name, gain):
-            gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
-    odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
-    if WORN in odds:
-        odds[WORN] = wear
-    if STUCK in odds:  # a valve that never had to open fits like a sound one, so it keeps at least its prior odds
-        odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + UNSEEN_STUCK_ODDS)
-    best, pressure = sound.fits.scores, largest_pressure(blocks, sound.fits.best, sound.actuator)
-    hidden = hidden_relief_log_prior(pressure, sound.actuator.circuit.relief_pressure) - GAIN
-    likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # if hidden, no score changes
-    odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
-    chances = fault_probabilities(odds)
-    # if the pressure came near the rig file's setting, few settings remain above it, and a report would say little
-    told = {name: chance for name, chance in chances.items() if name != EARLY or chance > LEAST_REPORTED}
-    above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
-    open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
-    worn = [tried.fits.scores for fault, tried in beside.faulty if fault.name == WORN]
-    scores = np.array([best, *worn]) if WORN in odds else None
-    return OutsideFaults((), not_excluded_notes(open_, best), scores, sum(chances.values()))
+    beside = _FaultyCircuits(blocks, tuple(fits_with_faults(blocks, sound, runs)), sound)
+    beside = _with_sound_searched_again(beside, runs)
+    shown = beside.shown_fault
+    return OutsideFaults((shown,)) if shown is not None else _faults_left_open(beside)
 
 
 def circuits_with_faults(
@@ -245,11 +171,10 @@ def circuits_with_faults(
     Yields
     ------
     tuple of float and ClassFits
-        What is presumed of the fault before a log is seen, a log-likelihood beside that of a sound actuator
-        [dimensionless], and the circuits with it.
+        Prior log-odds of the fault against a sound actuator [dimensionless], and the circuits with it.
     """
     runs = nominal_runs(blocks, actuator)
-    for fault, tried in _fits_with_faults(blocks, sound_circuit(blocks, fits, actuator, runs), runs, HOPELESS - gained):
+    for fault, tried in fits_with_faults(blocks, sound_circuit(blocks, fits, actuator, runs), runs, HOPELESS - gained):
         yield fault.log_prior - GAIN, tried.fits
 
 
@@ -274,34 +199,57 @@ def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator)
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
     gains = {SOUND: sound.score - float(np.max(fits.scores))}
-    for fault, tried in _fits_with_faults(blocks, sound, runs):
+    for fault, tried in fits_with_faults(blocks, sound, runs):
         gain = tried.score - sound.score + fault.log_prior
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
     return gains
 
 
-def _fits_with_faults(
-    blocks: Blocks, sound: Trial, runs: Array, behind: float = HOPELESS
-) -> Iterator[tuple[_Fault, Trial]]:
-    """Yield each fault, and the circuit with it that explains a log best."""
-    for fault in _faults(sound.actuator, largest_pressure(blocks, sound.fits.best, sound.actuator)):
-        yield fault, _fit_with_fault(fault, blocks, sound, runs, behind)
+def _with_sound_searched_again(beside: _FaultyCircuits, runs: Array) -> _FaultyCircuits:
+    """Return the circuits with the sound one searched again from each faulty one that is likelier, and once anew.
+
+    A search may end short of the best: a fault that gains only for that reason is none.
+    """
+    asked, actuator = list[Fault](), beside.sound.actuator
+    while beside.shown_fault is not None and (leading := beside.leading)[0] not in asked:
+        starts = (leading[1].fits.best.coordinates, *(() if asked else (None,)))
+        again = [Trial(actuator, fit_classes(beside.blocks, actuator, runs=runs, start=start)) for start in starts]
+        likeliest = max([beside.sound, *again], key=lambda one: log_likelihood(beside.blocks, one))
+        beside = replace(beside, sound=likeliest)
+        asked.append(leading[0])
+    return beside
 
 
-def _fit_with_fault(fault: _Fault, blocks: Blocks, sound: Trial, runs: Array, behind: float) -> Trial:
-    """Return the best circuit with a fault, unless it is too far behind the sound one."""
-    faulty = replace(sound.actuator, circuit=fault.circuit)
-    wanted = LASTING * (behind - sound.score)  # a region's score is never better than the misfit
-    if not fault.in_another_condition:
-        start = sound.fits.best.coordinates
-        return Trial(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
-    runs = nominal_runs(blocks, faulty)
-    start = faulty.conditions[int(np.argmin([misfit(blocks, run) for run in runs]))]
-    roughly = Trial(faulty, fit_classes(blocks, faulty, runs=runs, start=start, wanted=wanted))
-    if roughly.score < sound.score - behind + HOPELESS - THOROUGH:
-        return roughly
-    anew = Trial(faulty, fit_classes(blocks, faulty, runs=runs, wanted=wanted))
-    return max(roughly, anew, key=lambda one: one.score)
+def _faults_left_open(beside: _FaultyCircuits) -> OutsideFaults:
+    """Return the faults that a log does not exclude, though it shows none."""
+    sound, gains, likeliest = beside.sound, dict[str, float](), dict[str, Array]()
+    for fault, tried in beside.faulty:
+        gain = beside.gain(fault, tried)
+        if gain >= gains.get(fault.name, gain):
+            gains[fault.name], likeliest[fault.name] = gain, tried.fits.scores
+    odds = _log_odds(gains, beside.wear_log_odds)
+    best, pressure = sound.fits.scores, largest_pressure(beside.blocks, sound.fits.best, sound.actuator)
+    hidden = hidden_relief_log_prior(pressure, sound.actuator.circuit.relief_pressure) - GAIN
+    likeliest[EARLY] = likeliest[EARLY] if odds.get(EARLY, -math.inf) > hidden else best  # if hidden, no score changes
+    odds[EARLY] = float(np.logaddexp(odds.get(EARLY, -math.inf), hidden))
+    chances = fault_probabilities(odds)
+    # if the pressure came near the rig file's setting, few settings remain above it, and a report would say little
+    told = {name: chance for name, chance in chances.items() if name != EARLY or chance > LEAST_REPORTED}
+    above = {EARLY: f"{EARLY}, above {1e-5 * pressure:.2g} bar"} if likeliest[EARLY] is best else {}
+    open_ = [OpenFault(above.get(name, name), chance, likeliest.get(name, best)) for name, chance in told.items()]
+    worn = [tried.fits.scores for fault, tried in beside.faulty if fault.name == WORN]
+    scores = np.array([best, *worn]) if WORN in odds else None
+    return OutsideFaults((), not_excluded_notes(open_, best), scores, sum(chances.values()))
+
+
+def _log_odds(gains: Mapping[str, float], wear: float) -> dict[str, float]:
+    """Return the log-odds of each fault that a log does not exclude, by what it gains; ``wear`` are those of wear."""
+    odds = {name: gain - GAIN for name, gain in gains.items() if gain > NOT_EXCLUDED}
+    if WORN in odds:
+        odds[WORN] = wear
+    if STUCK in odds:  # a valve that never had to open fits like a sound one, so it keeps at least its prior odds
+        odds[STUCK] = max(odds[STUCK], min(gains[STUCK], 0.0) + UNSEEN_STUCK_ODDS)
+    return odds
 
 
 def _scale_gain(blocks: Blocks, tried: Trial, sound: Trial) -> float:
@@ -322,28 +270,3 @@ def _scale_log_likelihood(tried: Trial) -> float:
     told = float(pull @ PRESSURE_SCALE)
     off = tried.fits.best.as_run.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
     return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SETTING_SPREAD**2)
-
-
-def _delivery_note(share: float) -> Note:
-    return AgainstCode.PUMP_DELIVERS_LESS.note(percent=100.0 * share)
-
-
-def _faults(actuator: Actuator, pressure: float) -> Iterator[_Fault]:
-    """Yield the faults that are tested, given the largest pressure of the sound circuit [Pa]."""
-    sound = actuator.circuit
-    for share in DELIVERIES:
-        worn = replace(sound, pump_displacement=share * sound.pump_displacement)
-        (presumed,) = delivery_log_priors((share,)).tolist()
-        yield _Fault(_delivery_note(share), WORN, worn, in_another_condition=True, extra_gain=-presumed)
-    for share in SETTINGS if 0.0 < pressure < math.inf else ():
-        early = replace(sound, relief_pressure=share * pressure)
-        yield _Fault(AgainstCode.RELIEF_EARLY.note(), EARLY, early, log_prior=SETTING_LOG_PRIOR)
-    major = actuator.conditions[list(CONDITIONS).index("major_leakage"), COORDINATES.index("leakage")]
-    for side in "ab":
-        note = AgainstCode.MAKEUP_STUCK.note(side=side.upper())
-        for share in SHUT_SHARES:
-            stuck = with_make_up_faults(sound, **{f"makeup_shut_{side}": share})
-            yield _Fault(note, STUCK, stuck)
-        for size in SEAT_LEAKAGES:
-            leaking = with_make_up_faults(sound, **{f"seat_leakage_{side}": size * float(np.exp(major))})
-            yield _Fault(AgainstCode.MAKEUP_LEAKS.note(), "a make-up valve that leaks", leaking)

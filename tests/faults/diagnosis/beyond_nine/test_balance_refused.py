@@ -11,7 +11,8 @@ from estimation.finding import Gate, Outcome
 from estimation.notes import EstimateCode, RigCode
 from faults.diagnosis.beyond_nine import balance_refused
 from faults.diagnosis.beyond_nine.balance_refused import CLOSE_RESIDUALS, LARGEST_GAINS, class_without_balance
-from faults.diagnosis.beyond_nine.other_faults import EARLY, SOUND, STUCK, WORN, gains_of_other_circuits
+from faults.diagnosis.beyond_nine.faulty_circuits import EARLY, STUCK, WORN
+from faults.diagnosis.beyond_nine.other_faults import SOUND, gains_of_other_circuits
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.class_regions import fit_classes
 from faults.diagnosis.evidence import Scoreboard

@@ -8,7 +8,7 @@ import pytest
 
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis.beyond_nine import other_faults
+from faults.diagnosis.beyond_nine import faulty_circuits, other_faults
 from faults.diagnosis.beyond_nine.other_faults import OutsideFaults, faults_outside
 from faults.diagnosis.beyond_nine.sound_circuit import largest_pressure
 from faults.diagnosis.by_circuits import diagnose_clean
@@ -127,7 +127,8 @@ def test_a_relief_valve_that_opens_above_the_largest_pressure_is_not_excluded() 
 def test_no_faulty_circuit_is_fitted_with_pressure_or_to_a_stuck_piston(monkeypatch: pytest.MonkeyPatch) -> None:
     seen, still = log_of(pressure=True), replace(log_of(), velocity=0.0 * log_of().velocity)
     fits = [fit_classes(blocks, ACTUATOR) for blocks in (seen, still)]
-    monkeypatch.setattr(other_faults, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
+    for module in (faulty_circuits, other_faults):
+        monkeypatch.setattr(module, "fit_classes", lambda *_, **__: pytest.fail("a circuit was fitted"))
     for blocks, one in zip((seen, still), fits, strict=True):
         assert faults_outside(blocks, one, ACTUATOR) == OutsideFaults()
 
@@ -139,7 +140,7 @@ def test_a_fault_is_not_named_if_a_second_fit_of_the_sound_circuit_is_as_good(
     blocks = log_of(FAULTS["pump"][0])
     fits = fit_classes(blocks, ACTUATOR)
     assert faults_outside(blocks, fits, ACTUATOR).against
-    fit, worn = other_faults.fit_classes, FAULTS["pump"][0].pump_displacement
+    fit, worn = fit_classes, FAULTS["pump"][0].pump_displacement
     ended: list[np.ndarray] = []
 
     def as_good(blocks: Blocks, actuator: Actuator, **how: np.ndarray) -> object:
@@ -152,7 +153,8 @@ def test_a_fault_is_not_named_if_a_second_fit_of_the_sound_circuit_is_as_good(
         again = begun is None if anew else begun is not None and np.array_equal(begun, ended[-1])
         return replace(found, scores=found.scores + 1e3) if again else found
 
-    monkeypatch.setattr(other_faults, "fit_classes", as_good)
+    for module in (faulty_circuits, other_faults):
+        monkeypatch.setattr(module, "fit_classes", as_good)
     assert not faults_outside(blocks, fits, ACTUATOR).against
 
 

@@ -10,7 +10,7 @@ import pytest
 from estimation.log_checks.clean import clean_log
 from faults.conditions import CONDITIONS
 from faults.diagnosis import by_circuits
-from faults.diagnosis.beyond_nine import other_faults, sound_circuit, wear
+from faults.diagnosis.beyond_nine import faulty_circuits, other_faults, sound_circuit, wear
 from faults.diagnosis.beyond_nine.left_open import LEAST_REPORTED, STUCK_VALVE_PRIOR
 from faults.diagnosis.beyond_nine.other_faults import OutsideFaults, faults_outside
 from faults.diagnosis.calibration import shipped_calibration
@@ -53,12 +53,18 @@ def looked(
         asked.append((actuator.circuit, start is not None))
         return fits(score(actuator.circuit))
 
-    for module in (other_faults, sound_circuit):
-        monkeypatch.setattr(module, "fit_classes", fitted)
-    monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
-    monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
-    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
+    use(monkeypatch, fitted, pressure)
     return faults_outside(LOG, fits(0.0), ACTUATOR), asked
+
+
+def use(monkeypatch: pytest.MonkeyPatch, fitted: Callable[..., Any], pressure: float = 1e6) -> None:
+    """Have every circuit fitted by a function, without a run; the largest pressure is as given [Pa]."""
+    for module in (faulty_circuits, other_faults, sound_circuit):
+        monkeypatch.setattr(module, "fit_classes", fitted)
+    for module in (faulty_circuits, other_faults):
+        monkeypatch.setattr(module, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
+        monkeypatch.setattr(module, "largest_pressure", lambda *_: pressure)
+    monkeypatch.setattr(faulty_circuits, "misfit", lambda *_: 0.0)
 
 
 def worn(circuit: CircuitParameters) -> float:
@@ -163,7 +169,7 @@ def test_the_gain_of_a_low_relief_valve_is_averaged_over_its_possible_settings(
 
     against, open_, _ = decided(monkeypatch, score)
     assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
-    assert bool(open_ and other_faults.EARLY in open_[0].data["faults"]) == said
+    assert bool(open_ and faulty_circuits.EARLY in open_[0].data["faults"]) == said
 
 
 @pytest.mark.parametrize(("pressure", "off", "named"), [(1e6, 0.5, False), (3.5e6, 0.5, True), (3.5e6, 0.1, False)])
@@ -177,10 +183,7 @@ def test_a_low_relief_valve_is_named_if_its_stated_setting_needs_an_implausible_
         place = places[int(actuator.circuit.relief_pressure == SOUND.relief_pressure)]
         return SimpleNamespace(scores=np.array([-9.0, 0.0]), best=made_fit_at(place))
 
-    looked(monkeypatch, lambda _: 0.0)
-    for module in (other_faults, sound_circuit):
-        monkeypatch.setattr(module, "fit_classes", fitted)
-    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: pressure)
+    use(monkeypatch, fitted, pressure)
     against = faults_outside(LOG, fitted(LOG, ACTUATOR), ACTUATOR).against
     assert [note.code for note in against] == ([AgainstCode.RELIEF_EARLY] if named else [])
 
@@ -194,12 +197,10 @@ def test_the_search_for_a_fault_ends_if_it_cannot_come_within_twenty_of_the_soun
         wanted.extend([how["wanted"]] if "wanted" in how else [])
         return fits(3.0 if actuator.circuit.makeup_conductance != SOUND.makeup_conductance else 0.0)
 
-    looked(monkeypatch, lambda _: 0.0)
-    for module in (other_faults, sound_circuit):
-        monkeypatch.setattr(module, "fit_classes", fitted)
+    use(monkeypatch, fitted)
     faults_outside(LOG, fits(0.0), ACTUATOR)
     # five pumps twice, two relief settings, and for each make-up valve four blocked shares and two seat leakages
-    assert len(wanted) == 10 + 2 + 2 * (len(other_faults.SHUT_SHARES) + 2)
+    assert len(wanted) == 10 + 2 + 2 * (len(faulty_circuits.SHUT_SHARES) + 2)
     assert set(wanted) == {30.0 * (20.0 - 3.0)}
 
 
@@ -320,7 +321,7 @@ def test_a_low_relief_valve_that_never_opened_in_a_log_keeps_its_prior_probabili
     hidden = np.exp(-4.0) * np.clip(np.log10(SOUND.relief_pressure / pressure), 0.0, 1.0)
     assert found.faulty == pytest.approx(hidden / (1.0 + hidden))
     said = [str(note.data["faults"]) for note in found.open]
-    above = f"{other_faults.EARLY}, above {1e-5 * pressure:.2g} bar ({percent} %)"
+    above = f"{faulty_circuits.EARLY}, above {1e-5 * pressure:.2g} bar ({percent} %)"
     assert said == ([] if percent is None else [above])
 
 
@@ -339,11 +340,7 @@ def test_the_note_on_an_open_fault_states_the_condition_with_that_fault(
         leaks = getattr(actuator.circuit, "seat_leakage_a", 0.0) > 0.0
         return ahead(first=moves) if leaks else ahead(first=False) if actuator.circuit == SOUND else fits(-9.0)
 
-    for module in (other_faults, sound_circuit):
-        monkeypatch.setattr(module, "fit_classes", fitted)
-    monkeypatch.setattr(other_faults, "nominal_runs", lambda *_: np.zeros((9, 1, 1)))
-    monkeypatch.setattr(other_faults, "misfit", lambda *_: 0.0)
-    monkeypatch.setattr(other_faults, "largest_pressure", lambda *_: 5e5)
+    use(monkeypatch, fitted, 5e5)
     (note,) = faults_outside(LOG, ahead(first=False), ACTUATOR).open
     same = "the condition would be the same"
     leaky = "with a make-up valve that leaks it would be normal"
