@@ -10,9 +10,9 @@ from math import log as ln
 from estimation.eha.result import BulkModulusEstimate
 from estimation.finding import Outcome
 from estimation.log_checks.channel_names import PRESSURE
-from estimation.log_checks.channel_physics import LONG, MIDDLE, REFUTED, TOLD
+from estimation.log_checks.channel_physics import LONG, MIDDLE, TOLD
 from estimation.log_checks.clean import CleanLog
-from estimation.log_checks.flow_balance import flow_balance
+from estimation.log_checks.flow_balance import REFUTED, flow_balance
 from estimation.notes import EstimateCode
 from plant.eha.model import EhaParameters
 from plant.log.record import Record

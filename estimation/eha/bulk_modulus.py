@@ -24,7 +24,7 @@ from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
 from estimation.log_checks.clean import CleanLog, clean_log
 from estimation.log_checks.first_belief import START_STD, begins_in_motion, first_belief, first_load
-from estimation.log_checks.unit_slips import FARTHEST, RPM, TURNS
+from estimation.log_checks.unit_slips import FARTHEST, RPM, TURNS, unit_note
 from estimation.models.eha_forms import FORMS
 from estimation.notes import ChannelCode, EstimateCode
 from estimation.trust.bounds import bulk_modulus_bound
@@ -300,7 +300,7 @@ def _channel_slips(fit: FormFit, parameters: EhaParameters) -> tuple[Note, ...]:
     share = None if fit.explanation is None else delivery_share(fit.explanation, parameters)
     if share is None or share <= FARTHEST:
         return tuple(note for note in fit.reasons if isinstance(note.code, ChannelCode))
-    return (ChannelCode.CHANNEL_UNIT.note(channel=SPEED, against=POSITION, factor=1.0 / share, slip=TURNS[RPM]),)
+    return (unit_note(SPEED, POSITION, 1.0 / share, TURNS[RPM]),)
 
 
 def _mistaken_channels_estimate(log: CleanLog, form: str) -> BulkModulusEstimate:

@@ -13,6 +13,10 @@ from plant.log.record import Record
 FEWEST_SAMPLES, FEWEST_BLOCKS = 5, 20
 """Least samples per block, and least blocks for a conclusion [count]."""
 
+SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
+"""Correlations of one motion measured twice, of a piston with its pump, and with one of opposite sign: compliance and
+friction never oppose their drive, neither in the long run nor from block to block."""
+
 
 @dataclass(frozen=True, eq=False)
 class ChannelBlocks:

@@ -5,23 +5,24 @@ leakage and friction may take any share. Pumped oil moves the piston, and compre
 counts only if it is near that of a slip of units, and far from what a wrong rig file can explain.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from estimation.log_checks.channel_blocks import (
+    FOLLOWS,
+    OPPOSED,
+    SURE,
     ChannelBlocks,
     channel_blocks,
     correlation_and_ratio,
     path_agreement,
     pressure_flow_correlation,
 )
-from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY
-from estimation.log_checks.flow_balance import FlowBalance, flow_balance
-from estimation.log_checks.measurement_noise import position_variance
-from estimation.log_checks.unit_slips import DEGREES, FARTHEST, IN_DEGREES, LENGTHS, RPM, TURNS
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOCITY, motion_channels
+from estimation.log_checks.flow_balance import REFUTED, FlowBalance, flow_balance
+from estimation.log_checks.pump_units import pump_unit_notes
+from estimation.log_checks.unit_slips import FARTHEST, LENGTHS, NEAR, matching_slip, unit_note
 from estimation.notes import ChannelCode
-from plant.eha.model import EhaParameters, piston_areas
+from plant.eha.model import EhaParameters
 from plant.log.columns import TIME
 from plant.log.plausibility import LIMITS, SAMPLE_TIME_RANGE
 from plant.log.record import Record
@@ -33,22 +34,9 @@ MEASURED = (SPEED, POSITION, VELOCITY, PRESSURE)
 SHORT, MIDDLE, LONG = 0.01, 0.02, 0.05
 """Blocks over which velocity is compared with position, flows are balanced, and the piston follows the pump [s]."""
 
-NEAR = 1.15
-"""Factor within which a ratio of two sensors of one motion agrees with a slip of units [dimensionless]."""
-
-LEAST, MOST, LOST = 0.6, 1.3, 0.5
-"""Range of a balance's factor over that of a slip, and what a piston with large losses leaves of it [fraction]."""
-
 LEAST_DISAGREEMENT = 5.0
 """Ratio of two sensors of one motion from which one has an unknown unit; judged: errors of gain are smaller
 [dimensionless]."""
-
-TINY = 1e-3
-"""Factor of a length below which a piston seems to stand still, which cannot be leakage without pressure."""
-
-SURE, FOLLOWS, OPPOSED = 0.9, 0.6, -0.3
-"""Correlations of one motion measured twice, of a piston with its pump, and with one of opposite sign: compliance and
-friction never oppose their drive, neither in the long run nor from block to block."""
 
 LEAST_RETURN = 0.6
 """Least ratio between a piston's two directions from which speed lacks its sign: of its travel, its mean velocities,
@@ -58,31 +46,15 @@ LEAST_PERSISTENCE = 0.5
 """Least correlation of a moving piston's speed from block to block [dimensionless]: it is 0.81 to 0.99 in the nine
 conditions under steps and binary signals. An encoder's noise has -0.5, a velocity sensor's 0."""
 
-UNKNOWN_UNIT, UNKNOWN_RIG = "another unit", "another unit, or a rig file of another actuator"
-LOSSY_UNIT = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"
-"""Words for a factor that no known slip makes, or that one makes if most of the flow is lost."""
+UNKNOWN_UNIT = "another unit"
+"""Words for a factor that no known slip makes."""
 
 INCHES = {1.0 / 0.0254: "inches read as m", 25.4: "inches read as mm, or mm read as inches"}
 """Slips of a length in inches, by how far one sensor of a motion then goes beyond the other [dimensionless]."""
 
-EXPLAINED, KNOWN, TOLD = 0.9, 0.1, 4.0
-"""Share of the flow that a balance must explain, relative deviation up to which its factor counts, and deviations from
-zero from which a sign does."""
-
-FAST, SIX = 2.0, 6.0
-"""Factor above the motor's limit that a speed in revolutions per minute cannot reach, judged; and that of deg/s read as
-rpm [dimensionless]. Between the two the travel decides."""
-
-REFUTED = 2.0
-"""Difference of the piston's flow from the rig's, over what a balance leaves unexplained, from which a slip of units is
-seen in it [dimensionless]."""
-
-HOLDING_FRICTION_SHARE = 0.7
-"""Share of the rig's Coulomb friction up to which pressure moves no piston [fraction]; judged. With its seals a stuck
-piston takes a tenth of the oil of a sliding one, which was reported as rpm read as rad/s."""
-
-RESOLVED = 1e3
-"""Travel of a position in a wrong unit, over its noise; a stuck piston has less [dimensionless]."""
+EXPLAINED, TOLD = 0.9, 4.0
+"""Share of the flow that a balance must explain, and deviations from zero from which its sign counts [fraction,
+dimensionless]."""
 
 PRESSURE_UNIT_RATIO = 50.0
 """Ratio to the rig's compressibility, or its inverse, that means a unit of pressure and no oil [dimensionless]."""
@@ -112,7 +84,7 @@ def channel_mistakes(record: Record, p: EhaParameters) -> tuple[Note, ...]:
     balance = flow_balance(record, p, MIDDLE)
     if balance is not None and balance.explained < EXPLAINED:
         balance = None
-    units = tuple(_time_unit_instead(one, record.sample_time) for one in _pump_units(record, long, p, balance))
+    units = tuple(_time_unit_instead(one, record.sample_time) for one in pump_unit_notes(record, long, p, balance))
     unsigned = _unsigned_speed_notes(record, middle, balance)
     return unsigned or _wrong_sign_notes(record, middle, long, balance) or units or _pressure_units(middle, p, balance)
 
@@ -131,18 +103,10 @@ def _time_unit_instead(note: Note, sample_time: float) -> Note:
     if note.code != ChannelCode.CHANNEL_UNIT or note.data["channel"] != POSITION:
         return note
     if sample_time > SAMPLE_TIME_RANGE[1] and note.data["slip"] == LENGTHS[1e-3]:
-        return _unit_note(TIME, POSITION, 1e3, "ms read as s")
+        return unit_note(TIME, POSITION, 1e3, "ms read as s")
     if sample_time < SAMPLE_TIME_RANGE[0] and note.data["slip"] == LENGTHS[1e3]:
-        return _unit_note(TIME, POSITION, 1e-3, "s read as ms")
+        return unit_note(TIME, POSITION, 1e-3, "s read as ms")
     return note
-
-
-def _matching_slip(
-    ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR
-) -> float | None:
-    """Return the factor of the slip that a ratio is near, None if there is none."""
-    close = [one for one in slips if least <= ratio / one <= most]
-    return min(close, key=lambda one: abs(np.log(ratio / one)), default=None)
 
 
 def _swapped_notes(blocks: ChannelBlocks) -> tuple[Note, ...]:
@@ -169,14 +133,14 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         channel = against[0] if len(against) == 1 else f"{VELOCITY} or {POSITION}"
         other = POSITION if channel == VELOCITY else VELOCITY
         found.append(ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=other, correlation=same))
-    factor = _matching_slip(abs(ratio), LENGTHS)
+    factor = matching_slip(abs(ratio), LENGTHS)
     if factor is not None:
         large, small = (POSITION, VELOCITY) if factor > 1.0 else (VELOCITY, POSITION)
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty, other = (large, small) if too_far else (small, large)
         times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
         slip = factor if guilty == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
-        found.append(_unit_note(guilty, other, times, LENGTHS[slip]))
+        found.append(unit_note(guilty, other, times, LENGTHS[slip]))
     elif (
         not 1.0 / LEAST_DISAGREEMENT <= abs(ratio) <= LEAST_DISAGREEMENT
     ):  # such as a furlong read as a metre: only a pump shows which is wrong
@@ -184,17 +148,9 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
         guilty = large if too_far else f"{large} or {small}"
         times = max(abs(ratio), 1.0 / abs(ratio))
-        inches = _matching_slip(times, INCHES, 0.95, 1.05)
-        found.append(_unit_note(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
+        inches = matching_slip(times, INCHES, 0.95, 1.05)
+        found.append(unit_note(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
     return tuple(found)
-
-
-def _unit_note(channel: str, against: str, factor: float, slip: str) -> Note:
-    return ChannelCode.CHANNEL_UNIT.note(channel=channel, against=against, factor=factor, slip=slip)
-
-
-def _motion_channels(record: Record) -> str:
-    return " and ".join(name for name in (POSITION, VELOCITY) if name in record)
 
 
 def _wrong_sign_notes(
@@ -221,7 +177,7 @@ def _wrong_sign_notes(
         with_pump = with_pump or goes_along
         # a spring drives the piston back while the pump, whose whole flow leaks, goes on
         apart = apart and not goes_along
-    moved = _motion_channels(record)
+    moved = motion_channels(record)
     if apart:
         channel = SPEED if opposed else moved if with_pressure else f"{SPEED} or {moved}"
         against = SPEED if channel == moved else moved
@@ -254,79 +210,6 @@ def _unsigned_speed_notes(record: Record, middle: ChannelBlocks, balance: FlowBa
     return (ChannelCode.SPEED_UNSIGNED.note(channel=SPEED),)
 
 
-def _pump_units(record: Record, long: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
-    """Compare the piston's travel with the pumped volume, less leakage and compression if pressure is logged.
-
-    If the areas differ it moves farthest by the smaller one, which ``least`` uses.
-    """
-    together, ratio = path_agreement(long.piston, long.pumped)
-    gone, least = p.piston_area * ratio, min(piston_areas(p)) * ratio
-    far = gone > FARTHEST
-    turn = length = None
-    believed, alike = (False, False), set[float]()
-    told = balance if balance is not None and 0.0 < balance.swept_std < KNOWN * balance.swept else None
-    degrees = told is not None and 1.0 / MOST <= DEGREES / told.swept <= 1.0 / LEAST
-    if told is not None and told.rig_contradiction > REFUTED and (far or _slides(record, p)):
-        times = 1.0 / told.swept
-        far = far and times > 1.0
-        turn, length = (
-            _matching_slip(times, slips, 1.0 / MOST, 1.0 / (LOST if far else LEAST)) for slips in (TURNS, LENGTHS)
-        )
-        believed = (far or times < 1.0,) * 2
-    elif together > SURE and balance is None and not far:
-        length = _matching_slip(gone, LENGTHS)
-        believed = False, gone < TINY * NEAR and _exceeds_position_noise(record, long)
-    if turn is None and length is None and far and together > FOLLOWS:  # a balance may take motion for leakage
-        turn, length = (_matching_slip(gone, slips, LOST) for slips in (TURNS, LENGTHS))
-        believed, alike = (True, True), {one for one in TURNS if LOST <= gone / one <= NEAR}
-        if length is not None and length < 100.0 and " and " in _motion_channels(record):
-            length = None  # two channels agree: a piston that drifts while stuck makes a slip of speed look as large
-    fast = float(np.nanmax(np.abs(record[SPEED]))) / p.motor_speed_limit if SPEED in record else 0.0
-    too_fast = fast > FARTHEST and least < NEAR * min(TURNS)
-    if too_fast and (together > FOLLOWS or length is not None or degrees):
-        turn, believed = min(TURNS), (True, believed[1])
-    moved = _motion_channels(record)
-    slips: list[tuple[str, str, float]] = []
-    if turn is not None and believed[0] and least < NEAR * turn:
-        said = " or ".join(TURNS[one] for one in TURNS if one == turn or one in alike)
-        degrees = degrees or (fast > FAST * RPM and least * DEGREES < SIX**0.5)
-        slips.append((SPEED, IN_DEGREES, DEGREES) if degrees and turn == min(TURNS) else (SPEED, said, 1.0 / turn))
-    # position and velocity that agree are right
-    if length is not None and believed[1] and least < NEAR * length and not (slips and " and " in moved):
-        slips.append((moved, LENGTHS[length], length))
-    unlike = not slips and far and together > FOLLOWS and (balance is None or balance.swept * FARTHEST < 1.0)
-    if unlike and _sweeps_more_than_pumped(long, p):
-        lossy = 100.0 * NEAR < gone < 1e3  # too far for cm read as m, and for any unit of speed
-        channel = SPEED if " and " in moved and not lossy else f"{moved} or {SPEED}"
-        times = 1.0 / gone if channel == SPEED else gone
-        return (_unit_note(channel, moved if channel == SPEED else SPEED, times, LOSSY_UNIT if lossy else UNKNOWN_RIG),)
-    if not slips:
-        return ()
-    channel, slip = " or ".join(one[0] for one in slips), " or ".join(one[1] for one in slips)
-    return (_unit_note(channel, moved if channel == SPEED else SPEED, slips[0][2], slip),)
-
-
-def _sweeps_more_than_pumped(long: ChannelBlocks, p: EhaParameters) -> bool:
-    """Return whether a piston swept more than was pumped in all; at one speed nothing else shows how far it moved."""
-    if long.piston is None or long.pumped is None:
-        return False
-    return bool(p.piston_area * np.abs(long.piston).sum() > np.abs(long.pumped).sum())
-
-
-def _slides(record: Record, p: EhaParameters) -> bool:
-    """Return whether pressure is ever high enough to move the piston; a stuck one only yields on its seals."""
-    highest = float(np.nanmax(np.abs(record[PRESSURE]))) if PRESSURE in record else np.inf
-    return highest * p.piston_area > HOLDING_FRICTION_SHARE * p.friction_coulomb
-
-
-def _exceeds_position_noise(record: Record, long: ChannelBlocks) -> bool:
-    """Return whether the motion of a piston that hardly moves is well above the noise of its position."""
-    if long.position is None:
-        return False
-    noise = position_variance(record[POSITION]) ** 0.5
-    return float(np.ptp(long.position)) > RESOLVED * noise > 0.0
-
-
 def _pressure_units(middle: ChannelBlocks, p: EhaParameters, balance: FlowBalance | None) -> tuple[Note, ...]:
     """Judge the unit of pressure by the oil that it seems to compress, and by the pressure of sliding."""
     if middle.pressure is None or balance is None or balance.compressed < TOLD * balance.compressed_std:
@@ -338,4 +221,4 @@ def _pressure_units(middle: ChannelBlocks, p: EhaParameters, balance: FlowBalanc
     if not (small or large):
         return ()
     slip = "kPa, psi, bar or MPa read as Pa" if small else "Pa read as kPa, psi, bar or MPa"
-    return (_unit_note(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)
+    return (unit_note(PRESSURE, SPEED, 1.0 / balance.compressed, slip),)

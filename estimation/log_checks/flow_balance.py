@@ -29,6 +29,10 @@ HELD_BEYOND = 3.0
 LEAST_SHARE = 1e-12
 """Share of the flow that counts as left in any case, as in a log without noise [fraction]."""
 
+REFUTED = 2.0
+"""Difference of the piston's flow from the rig's, over what a balance leaves unexplained, from which a slip of units is
+seen in it [dimensionless]."""
+
 
 class FlowBalance(NamedTuple):
     """Balance of the pumped flow by least squares: motion, leakage, flow bias and compression.

@@ -4,6 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from estimation.notes import ChannelCode
+from plant.notes import Note
+
+NEAR = 1.15
+"""Factor within which a ratio of two sensors of one motion agrees with a slip of units [dimensionless]."""
+
 FARTHEST = 3.0
 """Ratio to the pumped flow that no piston can reach, whatever is wrong in the rig file [dimensionless]."""
 
@@ -33,3 +39,46 @@ LENGTHS: Mapping[float, str] = {
     1e-6: "m read as um",
 }
 """Slips of a length's unit, by their factors."""
+
+
+def matching_slip(
+    ratio: float, slips: Mapping[float, str], least: float = 1.0 / NEAR, most: float = NEAR
+) -> float | None:
+    """Return the factor of the slip that a ratio is near.
+
+    Parameters
+    ----------
+    ratio : float
+        A ratio that is 1 without a slip [dimensionless].
+    slips : Mapping[float, str]
+        The slips, by their factors [dimensionless].
+    least, most : float
+        Range of the ratio over a factor [dimensionless].
+
+    Returns
+    -------
+    float or None
+        The nearest factor within the range [dimensionless]; None if there is none.
+
+    Examples
+    --------
+    >>> matching_slip(9.3, LENGTHS), matching_slip(3.0, LENGTHS)
+    (10.0, None)
+    """
+    close = [one for one in slips if least <= ratio / one <= most]
+    return min(close, key=lambda one: abs(np.log(ratio / one)), default=None)
+
+
+def unit_note(channel: str, against: str, factor: float, slip: str) -> Note:
+    """Return the note on a channel in a wrong unit.
+
+    Parameters
+    ----------
+    channel, against : str
+        The channel, and the one that contradicts it.
+    factor : float
+        Factor by which it is too large [dimensionless].
+    slip : str
+        What was read as what.
+    """
+    return ChannelCode.CHANNEL_UNIT.note(channel=channel, against=against, factor=factor, slip=slip)

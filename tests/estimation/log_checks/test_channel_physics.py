@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from estimation.eha import bulk_modulus
 from estimation.eha.estimate import estimate_log
 from estimation.finding import Outcome
 from estimation.fits.hypothesis_search.form_fit import FormFit
-from estimation.log_checks import channel_physics
+from estimation.log_checks import channel_physics, pump_units
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.flow_balance import FlowBalance
 from estimation.notes import ChannelCode
@@ -220,7 +219,7 @@ RADIANS, TURNS_A_SECOND = "rad/s read as rpm", "rev/s read as rad/s"
         ("minor_leakage", 0.5 / np.pi, SPEED, TURNS_A_SECOND),
         ("normal", 1.0 / RPM, SPEED, RADIANS),
         ("minor_leakage", 1.0 / RPM, SPEED, f"{RADIANS} or {TURNS_A_SECOND}"),
-        ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", channel_physics.LOSSY_UNIT),
+        ("major_leakage_major_friction", 1e-3, f"{POSITION} and {VELOCITY} or {SPEED}", pump_units.LOSSY_UNIT),
     ],
 )
 def test_without_pressure_several_unit_errors_may_explain_the_lost_flow(
@@ -243,18 +242,6 @@ def test_a_log_with_a_channel_mistake_gets_no_values_and_no_class(*, pressure: b
         assert not found.probabilities
     assert found.unknown
     assert [note.code for note in found.advice] == [AdviceCode.MEND_COLUMNS]
-
-
-def test_a_position_is_resolved_only_if_its_motion_exceeds_its_noise() -> None:
-    rng = np.random.default_rng(1)
-    noise = 1e-6 * rng.standard_normal(2000)
-    for size, resolved in ((0.1 * channel_physics.RESOLVED, False), (10.0 * channel_physics.RESOLVED, True)):
-        moved = 1e-6 * size * np.sin(1e-3 * np.pi * np.arange(2000))
-        log = Record(1e-3, {POSITION: moved + noise})
-        blocks: Any = SimpleNamespace(position=moved)
-        assert channel_physics._exceeds_position_noise(log, blocks) is resolved
-    absent: Any = SimpleNamespace(position=None)
-    assert not channel_physics._exceeds_position_noise(Record(1e-3, {SPEED: noise}), absent)
 
 
 def test_a_flow_balance_that_explains_too_little_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,8 @@ from estimation.log_checks.channel_blocks import (
 )
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.flow_balance import FlowBalance, flow_balance
-from estimation.log_checks.unit_slips import LENGTHS, TURNS
+from estimation.log_checks.pump_units import pump_unit_notes
+from estimation.log_checks.unit_slips import LENGTHS, TURNS, matching_slip
 from plant.arrays import Array
 from plant.log.record import Record
 from plant.notes import Note
@@ -132,7 +133,7 @@ def what_pumped_flow_goes_into() -> dict[str, Any]:
 
 @NUMBERS.case()
 def slips_of_units() -> dict[str, Any]:
-    near = channel_physics._matching_slip  # pyright: ignore[reportPrivateUsage]
+    near = matching_slip
     return {
         "of a turn": {name: near(size, TURNS) for name, size in (("rpm", 0.1), ("rad/s", 10.0), ("none", 1.0))},
         "of a length, from": edge(lambda size: near(size, LENGTHS), 5.0, 10.0),
@@ -237,7 +238,7 @@ def units(share: float, size: float, record: Record | None = None, **of: Any) ->
     long = blocks(slope=together(share, size), pumped=pumped, **given)
     balance = replace_balance(**of) if of else None
     record = made_log(60) if record is None else record
-    return told(channel_physics._pump_units(record, long, HEALTHY, balance))  # pyright: ignore[reportPrivateUsage]
+    return told(pump_unit_notes(record, long, HEALTHY, balance))
 
 
 def unit(share: float, size: float, record: Record | None = None, **of: Any) -> list[str]:
