@@ -87,11 +87,6 @@ class Hypothesis:
         ----------
         values, std : Mapping[str, float]
             Parameters found, and standard deviations; those without one are known [SI].
-
-        Returns
-        -------
-        bool
-            Whether it does.
         """
         found = not self.lower or isfinite(std.get(self.free[0], 0.0))
         return found and all(NORMAL_95 * std.get(name, 0.0) < abs(values[name]) for name in self.known)

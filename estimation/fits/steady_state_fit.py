@@ -90,11 +90,6 @@ class Coefficient:
         ----------
         truth : float
             The value [SI].
-
-        Returns
-        -------
-        bool
-            Whether it does.
         """
         return self.low <= truth <= self.high
 

@@ -82,8 +82,6 @@ def begins_in_motion(record: Record, share: float = TURNING) -> bool:
 
     Parameters
     ----------
-    record : Record
-        The log.
     share : float
         Share of the log's motor speed, root mean square, from which the motor turns [fraction].
 

@@ -74,10 +74,6 @@ def flow_balance(record: Record, p: EhaParameters, length: float) -> FlowBalance
 
     Parameters
     ----------
-    record : Record
-        The log.
-    p : EhaParameters
-        The actuator.
     length : float
         Length of the blocks over which flows are balanced [s].
     """

@@ -109,8 +109,6 @@ def misses_motion(record: Record, hold: slice, p: EhaParameters) -> bool:
         The log, with position.
     hold : slice
         Samples with a constant reading.
-    p : EhaParameters
-        The actuator.
 
     Returns
     -------

@@ -78,11 +78,6 @@ class Scoreboard:
     def probabilities(self, calibration: Calibration) -> Mapping[str, float]:
         """Return the probability of each condition: a multinomial model on the evidences' log-odds.
 
-        Parameters
-        ----------
-        calibration : Calibration
-            Weights of the evidences.
-
         Returns
         -------
         Mapping[str, float]
@@ -177,8 +172,6 @@ def friction_left_open(scores: Array, blocks: Blocks, actuator: Actuator) -> Arr
         Log-likelihoods of the conditions [dimensionless].
     blocks : Blocks
         The log; without pressure every level may hold.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

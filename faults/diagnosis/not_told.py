@@ -67,8 +67,6 @@ def standstill_notes(record: Record, p: EhaParameters, not_told: Collection[Note
 
     Parameters
     ----------
-    record : Record
-        The log.
     p : EhaParameters
         The healthy actuator.
     not_told : collection of Note

@@ -145,11 +145,6 @@ def score_transfer_functions(record: Record, bank: Mapping[str, LinearModel]) ->
 def measured_velocity(record: Record) -> Array:
     """Return the logged velocity, or the derivative of the logged position.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     ndarray, shape (n,)

@@ -276,11 +276,6 @@ def healthy_severities(actuator: Actuator) -> Mapping[str, float]:
 def limits_of(actuator: Actuator) -> Mapping[str, float]:
     """Return the default limits beyond which an actuator is not sound; cached for the next log.
 
-    Parameters
-    ----------
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     Mapping[str, float]

@@ -44,8 +44,6 @@ def with_totals(
     ----------
     found : Mapping[str, Quantity]
         Severities, by the names of `faults.diagnosis.severity.UNITS`; an existing total interval is included.
-    actuator : Actuator
-        The healthy actuator.
     spreads : Mapping[str, Spread]
         Uncertainty of each entry of the rig.
     pressure : bool

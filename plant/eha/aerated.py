@@ -26,8 +26,6 @@ def with_air_in_oil(p: EhaParameters, air_fraction: float, bulk_modulus: float) 
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     air_fraction : float
         Volume of air over the volume of oil and air, at atmospheric pressure [fraction].
     bulk_modulus : float

@@ -34,11 +34,6 @@ SOFT_DEVIATIONS = 2.0
 def oil_exchange(p: EhaParameters) -> float:
     """Return the oil that the inner circuit gives and takes.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     float

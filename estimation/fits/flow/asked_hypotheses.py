@@ -184,10 +184,6 @@ def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bo
     ----------
     fit : GreyBoxFit
         The plain form's.
-    parameters : EhaParameters
-        The actuator.
-    log : GreyBoxLog
-        Its log.
     """
     stiff = max(parameters.bulk_modulus, fit.values["bulk_modulus"])
     return fit.values.get("makeup_conductance", 0.0) > WIDEST_SHARE * widest_makeup(
@@ -200,12 +196,8 @@ def is_astray(log: GreyBoxLog, fit: GreyBoxFit, parameters: EhaParameters) -> bo
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log.
     fit : GreyBoxFit
         The plain form's.
-    parameters : EhaParameters
-        The actuator.
     """
     return at_widest(fit, parameters, log) or is_far_stiffer(log, fit.values)
 
@@ -249,8 +241,6 @@ def wanted_gain_at_turns(log: GreyBoxLog, left: float = 1.0) -> float:
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log.
     left : float
         Mean squared normalised residual under the hypothesis [dimensionless].
 

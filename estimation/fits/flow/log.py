@@ -112,10 +112,6 @@ def speed_gaps(record: Record, parameters: EhaParameters, noise: float) -> Array
 
     Parameters
     ----------
-    record : Record
-        The log.
-    parameters : EhaParameters
-        The actuator.
     noise : float
         Standard deviation of the differential pressure's noise [Pa].
 

@@ -124,8 +124,6 @@ class CorrectedLogs:
         ----------
         plain : PlainFits
             The log's fits by the plain form.
-        found : GreyBoxFit
-            The fit.
         """
         stiffer = found.values["bulk_modulus"] > self.rig.bulk_modulus
         # whether friction and oil agree that pressure is off

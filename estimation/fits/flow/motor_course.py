@@ -67,13 +67,6 @@ def with_open_turns(logged: Logged, plain: PlainFits) -> PlainFits:
 
     This is tried last: free turns would absorb the effects of a pressure sensor's gain or lag.
 
-    Parameters
-    ----------
-    logged : Logged
-        The log.
-    plain : PlainFits
-        Its fits.
-
     Returns
     -------
     PlainFits

@@ -229,25 +229,12 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
 
 
 def fills_within_a_step(p: EhaParameters) -> bool:
-    """Return whether make-up valves of a usual size fill a chamber within a model step.
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-    """
+    """Return whether make-up valves of a usual size fill a chamber within a model step."""
     return 2.0 * p.chamber_volume * VALVE_DROP < LONGEST_STEP * p.bulk_modulus * p.rated_flow
 
 
 def with_stiff_oil(logged: Logged, plain: PlainFits) -> EhaParameters | None:
     """Return the actuator with the stiff oil that was found, if position noise starts to matter at that stiffness.
-
-    Parameters
-    ----------
-    logged : Logged
-        The log.
-    plain : PlainFits
-        Its fits.
 
     Returns
     -------

@@ -33,8 +33,6 @@ def with_pump_correction(means: GreyBoxLog, log: GreyBoxLog, p: EhaParameters) -
         The log, averaged by `estimation.fits.greybox.block_averages.averaged_log`.
     log : GreyBoxLog
         The log before averaging.
-    p : EhaParameters
-        The actuator.
 
     Returns
     -------

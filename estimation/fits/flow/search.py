@@ -86,8 +86,6 @@ def flow_starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     bulk_modulus : float
         First guess of effective bulk modulus [Pa].
 

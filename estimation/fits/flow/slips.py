@@ -106,8 +106,6 @@ def with_slips_corrected(slips: Sequence[Slip], logged: Logged) -> Logged | None
     ----------
     slips : sequence of Slip
         The slips, of different channels.
-    logged : Logged
-        The log.
 
     Returns
     -------

@@ -21,11 +21,6 @@ def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
         The log, as the flow form sees it.
     p : EhaParameters
         The actuator.
-
-    Returns
-    -------
-    bool
-        Whether it does.
     """
     speed, position = (log.drives[:, FLOW_FORM.drives.index(name)] for name in FLOW_FORM.drives)
     samples = min(max(1, round(OUTRUN_SPAN / log.sample_time)), len(position) - 1)

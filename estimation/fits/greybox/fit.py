@@ -147,8 +147,6 @@ def fit_greybox(
 
     Parameters
     ----------
-    model : GreyBoxModel
-        The model.
     log : GreyBoxLog
         The log, see `estimation.fits.greybox.log.greybox_log`.
     starts : sequence of Mapping[str, float]

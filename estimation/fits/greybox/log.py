@@ -299,8 +299,6 @@ def greybox_log(
 
     Parameters
     ----------
-    model : GreyBoxModel
-        The model.
     record : Record
         The log, with the model's drives and outputs.
     parameters : dataclass

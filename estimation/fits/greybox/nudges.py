@@ -24,8 +24,6 @@ def nudge_for(log: GreyBoxLog, model: GreyBoxModel, free: Collection[str]) -> fl
     ----------
     log : GreyBoxLog
         The log, with the actuator's parameters.
-    model : GreyBoxModel
-        The model.
     free : collection of str
         Parameters that are fitted.
 

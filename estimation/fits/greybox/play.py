@@ -213,11 +213,6 @@ def sensed_play(record: Record) -> ShownPlay:
     While the encoder is at rest, the seals hold the piston, which moves with pressure. Without play the encoder moves
     as far as velocity says; within the play it does not move. A velocity derived from the encoder shows nothing.
 
-    Parameters
-    ----------
-    record : Record
-        The log.
-
     Returns
     -------
     ShownPlay

@@ -36,8 +36,6 @@ def steps_where_needed(problem: Problem, theta: Array) -> IntArray:
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     theta : ndarray, shape (unknowns,)
         The point [dimensionless].
 
@@ -82,8 +80,6 @@ def with_steps_where_needed(problem: Problem, theta: Array) -> Problem:
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     theta : ndarray, shape (unknowns,)
         The point [dimensionless].
 
@@ -100,8 +96,6 @@ def step_errors(problem: Problem, theta: Array) -> Array:
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     theta : ndarray, shape (unknowns,)
         The point [dimensionless].
 

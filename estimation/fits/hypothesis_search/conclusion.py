@@ -29,8 +29,6 @@ def conclude(log: GreyBoxLog, parameters: EhaParameters, counted: Sequence[Trial
     ----------
     log : GreyBoxLog
         The log, widened.
-    parameters : EhaParameters
-        The actuator.
     counted : sequence of Trial
         Sets that explain the log alike, fitted to the end.
     accepted : callable

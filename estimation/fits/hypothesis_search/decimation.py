@@ -122,8 +122,6 @@ def cost_over_noise(log: GreyBoxLog, cost: float) -> float:
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log.
     cost : float
         Half the sum of squares [dimensionless].
 
@@ -141,8 +139,6 @@ def decimation_for(log: GreyBoxLog, left: float) -> int:
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log.
     left : float
         Cost of the plain form, or of the first of two hypotheses, see `cost_over_noise` [dimensionless].
 

@@ -16,11 +16,6 @@ LEAST_LEAKAGE = 1e-3
 def leakage_guess(p: EhaParameters) -> float:
     """Return the first guess of a leakage [m^3/(s Pa)].
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     float
@@ -31,11 +26,6 @@ def leakage_guess(p: EhaParameters) -> float:
 
 def flow_bias_guess(p: EhaParameters) -> float:
     """Return the first guess of a flow bias [m^3/s].
-
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
 
     Returns
     -------

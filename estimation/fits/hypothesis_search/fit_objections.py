@@ -67,8 +67,6 @@ def objections(fit: GreyBoxFit, noisy: bool) -> tuple[Note, ...]:
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
     noisy : bool
         Whether position noise matters.
 
@@ -97,8 +95,6 @@ def objections_and_play(fit: GreyBoxFit, noisy: bool, shown: ShownPlay, sensed: 
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
     noisy : bool
         Whether position noise matters.
     shown, sensed : ShownPlay
@@ -118,8 +114,6 @@ def is_too_close(fit: GreyBoxFit, noisy: bool) -> bool:
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
     noisy : bool
         Whether position noise matters.
     """
@@ -141,15 +135,8 @@ def fit_explains(fit: GreyBoxFit, noisy: bool) -> bool:
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
     noisy : bool
         Whether position noise matters.
-
-    Returns
-    -------
-    bool
-        Whether it is so.
     """
     return not objections(fit, noisy)
 
@@ -159,14 +146,7 @@ def fit_explains_all(fit: GreyBoxFit, noisy: bool) -> bool:
 
     Parameters
     ----------
-    fit : GreyBoxFit
-        The fit.
     noisy : bool
         Whether position noise matters.
-
-    Returns
-    -------
-    bool
-        Whether it is so.
     """
     return fit_explains(fit, noisy) and (noisy or not exceeds_noise(fit))

@@ -106,8 +106,6 @@ def confirms_offset(found: RippleFits, largest: float, parameters: EhaParameters
         The fits.
     largest : float
         As in `with_pump_ripple` [dimensionless].
-    parameters : EhaParameters
-        The actuator.
     """
     small = abs(found.log.speed_offset) < MOST_SHARE * parameters.rated_speed
     return small and is_sure(found, largest) and found.best.speed_offset.gain < OFFSET_WORTH

@@ -101,13 +101,6 @@ def shut_in_pressure(log: GreyBoxLog) -> float:
 def usual_pressure(log: GreyBoxLog, parameters: EhaParameters) -> float:
     """Return the root-mean-square pressure of the loaded side of a log.
 
-    Parameters
-    ----------
-    log : GreyBoxLog
-        The log.
-    parameters : EhaParameters
-        The actuator.
-
     Returns
     -------
     float

@@ -199,8 +199,6 @@ def misread_start(problem: FreedProblem, guess: Array, one: Hypothesis) -> Seque
 
     Parameters
     ----------
-    problem : FreedProblem
-        The problem.
     guess : ndarray, shape (unknowns,)
         First guess [dimensionless].
     one : Hypothesis

@@ -49,8 +49,6 @@ def without_chatter(problem: FreedProblem, theta: Array) -> FreedProblem:
 
     Parameters
     ----------
-    problem : FreedProblem
-        The problem.
     theta : ndarray, shape (unknowns,)
         The point [dimensionless].
 

@@ -173,8 +173,6 @@ def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
     ----------
     chi_square : float
         Mean squared normalised residual of a fit [dimensionless].
-    log : GreyBoxLog
-        Its log.
 
     Returns
     -------

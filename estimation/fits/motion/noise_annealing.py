@@ -37,8 +37,6 @@ def annealed(
 
     Parameters
     ----------
-    problem : FreedProblem
-        The problem.
     point : Point
         Where a descent ended.
     bounds : tuple of ndarray, shape (unknowns,)

@@ -325,8 +325,6 @@ def rough_problem(problem: FreedProblem, factors: tuple[float, float]) -> FreedP
 
     Parameters
     ----------
-    problem : FreedProblem
-        The problem.
     factors : tuple of float
         Factors on variance and random walk [dimensionless].
     """

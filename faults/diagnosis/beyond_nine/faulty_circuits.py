@@ -89,8 +89,6 @@ def fits_with_faults(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     sound : Trial
         The best circuit without a fault.
     runs : ndarray, shape (9, n, outputs)

@@ -195,11 +195,6 @@ def _regression(columns: Array, push: Array, centre: Array, doubt: Array) -> tup
 def sliding_blocks(blocks: Blocks) -> NDArray[np.bool_]:
     """Return the blocks in which the piston has slid one way long enough for steady sliding friction.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-
     Returns
     -------
     ndarray, shape (n,)

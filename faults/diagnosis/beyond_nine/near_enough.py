@@ -33,15 +33,6 @@ def is_only_outside(against: Sequence[Note]) -> bool:
 def is_outside_conditions(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> bool:
     """Return whether circuits are outside the nine conditions by more than a lasting model error.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    fits : ClassFits
-        The circuits fitted to it.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     bool

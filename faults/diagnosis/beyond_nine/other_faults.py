@@ -131,10 +131,6 @@ def faults_outside(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Outsi
     ----------
     blocks : Blocks
         The log in blocks, without pressure.
-    fits : ClassFits
-        The circuits fitted to it.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -132,12 +132,8 @@ def chance_by_conditions(
     ----------
     board : Scoreboard
         The evidences of a sound pump.
-    actuator : Actuator
-        The healthy actuator.
     left : UndeterminedDelivery
         What the balance leaves open.
-    calibration : Calibration
-        Weights of the evidences.
 
     Returns
     -------
@@ -242,12 +238,8 @@ def probabilities_over_wear(
     ----------
     board : Scoreboard
         The evidences of a sound pump.
-    actuator : Actuator
-        The healthy actuator.
     remarks : sequence of Note
         Notes on what the flow balance leaves open.
-    calibration : Calibration
-        Weights of the evidences.
 
     Returns
     -------

@@ -29,12 +29,8 @@ def with_end_stop(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> tuple[
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     fits : ClassFits
         The circuits fitted without a stop.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -96,10 +96,6 @@ def in_one_condition(split: Split, blocks: Blocks, actuator: Actuator) -> bool:
     ----------
     split : Split
         Where the log splits.
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

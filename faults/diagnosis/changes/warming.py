@@ -128,8 +128,6 @@ def with_drift(blocks: Blocks, logarithm: float) -> Blocks:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     logarithm : float
         Logarithm of leakage at the end over that at the beginning [dimensionless].
 

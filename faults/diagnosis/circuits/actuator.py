@@ -66,11 +66,6 @@ def actuator_of(parameters: EhaParameters) -> Actuator:
 def with_room_for_stroke(p: EhaParameters) -> EhaParameters:
     """Return an actuator whose chambers have room for its stroke: a stroke is measured, a volume is estimated.
 
-    Parameters
-    ----------
-    p : EhaParameters
-        The actuator.
-
     Returns
     -------
     EhaParameters

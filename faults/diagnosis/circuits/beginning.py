@@ -57,8 +57,6 @@ def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beg
 
     Parameters
     ----------
-    record : Record
-        The log.
     pressure : ndarray, shape (samples,), or None
         Differential pressure [Pa]; None without.
     velocity : ndarray, shape (n,)

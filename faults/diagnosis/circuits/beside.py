@@ -36,8 +36,6 @@ def beside_note(fits: ClassFits, actuator: Actuator) -> Note:
     ----------
     fits : ClassFits
         The fits; the best circuit is used.
-    actuator : Actuator
-        The healthy actuator.
     """
     place = fits.best.coordinates
 

@@ -38,13 +38,6 @@ NUDGE = 0.02
 def with_fitted_lead(blocks: Blocks, actuator: Actuator) -> Blocks:
     """Return a slow log with the lead of its motor that a circuit determines; any other log unchanged.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     Blocks
@@ -110,15 +103,6 @@ def with_motor_lead(blocks: Blocks, lead: float) -> Blocks:
 
 def nuisance_unknowns(fit: PointFit, blocks: Blocks, actuator: Actuator) -> tuple[Array, Array]:
     """Return the nuisance unknowns of a circuit: seldom known parameters, and a slow log's lead.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -64,8 +64,6 @@ def coordinates_of(p: EhaParameters, rated: float) -> Array:
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     rated : float
         Rated velocity [m/s].
 
@@ -86,8 +84,6 @@ def friction_parts(p: EhaParameters, rated: float) -> tuple[tuple[float, float, 
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     rated : float
         Rated velocity [m/s].
 
@@ -170,8 +166,6 @@ def predicted_outputs(blocks: Blocks, rows: Array) -> Array:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     rows : ndarray, shape (m, parameters)
         The circuits.
 

@@ -105,13 +105,6 @@ class PointFit:
 def nominal_runs(blocks: Blocks, actuator: Actuator) -> Array:
     """Return the runs of the nine nominal circuits under a log's motor speed; cached for the log.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     ndarray, shape (9, n, outputs)
@@ -127,8 +120,6 @@ def scales_of(blocks: Blocks, fitted: Array) -> Array:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     fitted : ndarray, shape (n, outputs)
         The model.
 
@@ -154,11 +145,6 @@ def least_scales(blocks: Blocks) -> Array:
 
 def least_misfit(blocks: Blocks) -> float:
     """Return the least value of `misfit`: that of a model whose residuals are the sensors' noise alone.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
 
     Returns
     -------
@@ -271,14 +257,8 @@ def with_cost_about(blocks: Blocks, actuator: Actuator, condition: str, fit: Poi
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
     condition : str
         The condition about which the weak prior lies.
-    fit : PointFit
-        The fit.
 
     Returns
     -------

@@ -128,11 +128,6 @@ class ClassFits:
     def separations(self, actuator: Actuator) -> Array:
         """Return the separation of each pair of conditions by the log, see `faults.diagnosis.circuits.region_scores`.
 
-        Parameters
-        ----------
-        actuator : Actuator
-            The healthy actuator.
-
         Returns
         -------
         ndarray, shape (9, 9)
@@ -259,8 +254,6 @@ def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
     ----------
     fitted : ndarray, shape (n, outputs)
         Outputs of the model [m/s, Pa].
-    blocks : Blocks
-        Its log.
 
     Returns
     -------
@@ -273,13 +266,6 @@ def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
 
 def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:
     """Return whether the piston only yields on its seals.
-
-    Parameters
-    ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -324,15 +310,6 @@ def nearest_score(fits: ClassFits, blocks: Blocks, actuator: Actuator) -> float:
 
     Without pressure, searches from several conditions end at circuits that follow a log about equally well, some within
     a condition and some far from all. A log is outside only if all are, or if those inside explain much less.
-
-    Parameters
-    ----------
-    fits : ClassFits
-        The circuits fitted to the log.
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

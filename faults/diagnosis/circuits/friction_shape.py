@@ -44,15 +44,6 @@ def bend_shifts(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     a regression. The residuals of the log are not used: a piston that reverses leaves errors of the seals' elasticity
     that look like a bend.
 
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     ndarray, shape (7, 3)

@@ -66,13 +66,6 @@ model's error has the same size [dimensionless]: a tenth of a second."""
 def information_divisor(fit: PointFit, blocks: Blocks) -> float:
     """Return the divisor of a fit's information for residuals beyond sensor noise.
 
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-
     Returns
     -------
     float
@@ -84,11 +77,6 @@ def information_divisor(fit: PointFit, blocks: Blocks) -> float:
 
 def seldom_known_spreads(actuator: Actuator) -> Array:
     """Return the prior deviations of an actuator's seldom known parameters.
-
-    Parameters
-    ----------
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -103,15 +91,6 @@ def seldom_known_spreads(actuator: Actuator) -> Array:
 
 def seldom_known_slopes(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     """Return the derivatives of the outputs by `SELDOM_KNOWN` and rod force, from one run of circuits side by side.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -199,8 +178,6 @@ def noise_power(left: Array, blocks: Blocks) -> Array:
     ----------
     left : ndarray, shape (n, outputs)
         Residuals, as from `residuals_of`.
-    blocks : Blocks
-        The log.
 
     Returns
     -------
@@ -224,8 +201,6 @@ def model_error(left: Array, blocks: Blocks) -> Array:
     ----------
     left : ndarray, shape (n, outputs)
         Residuals, as from `residuals_of`.
-    blocks : Blocks
-        The log.
 
     Returns
     -------

@@ -43,12 +43,6 @@ def circuits_left_open(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
-    fits : ClassFits
-        The circuits fitted to it.
-    actuator : Actuator
-        The healthy actuator.
     probabilities : Mapping[str, float]
         Probability of each condition [probability].
 

@@ -99,15 +99,6 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
 def unexplained_notes(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> list[Note]:
     """Return a note for each output of which the best circuit leaves too much.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log in blocks.
-    fits : ClassFits
-        The circuits fitted to it.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     list[Note]
@@ -137,12 +128,8 @@ def sticks_and_slips(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log in blocks.
     fit : PointFit
         The best circuit.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -67,8 +67,6 @@ def separations(spread: Array, actuator: Actuator) -> Array:
     ----------
     spread : ndarray, shape (7, 7)
         Covariance of the coordinates for intervals, see `ClassFits`.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

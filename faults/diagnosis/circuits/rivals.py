@@ -80,8 +80,6 @@ def remaining_doubts(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> t
     ----------
     doubts : sequence of Note
         Objections before a circuit was fitted.
-    blocks : Blocks
-        The log.
     fit : PointFit
         The best circuit.
 
@@ -161,8 +159,6 @@ def blocks_a_look(blocks: Blocks, error: Array) -> Array:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     error : ndarray, shape (outputs,)
         Share of each output's residuals that is a wrong model's error [fraction].
 
@@ -179,8 +175,6 @@ def model_error_share(blocks: Blocks, scales: Array) -> Array:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     scales : ndarray, shape (outputs,)
         Root mean square residuals [m/s, Pa].
 

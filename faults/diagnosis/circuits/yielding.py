@@ -23,13 +23,6 @@ it does not follow pressure either, it says nothing about the log."""
 def yielding_velocity(blocks: Blocks, actuator: Actuator) -> float:
     """Return the allowed residual velocity of a piston that yields on its seals.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        The log in blocks.
-    actuator : Actuator
-        The healthy actuator.
-
     Returns
     -------
     float
@@ -46,12 +39,8 @@ def yields_on_seals(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log in blocks.
     fit : PointFit
         The circuit.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -67,12 +56,8 @@ def follows_velocity(blocks: Blocks, fit: PointFit, actuator: Actuator) -> bool:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log in blocks.
     fit : PointFit
         The circuit.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
