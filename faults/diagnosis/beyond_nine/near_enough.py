@@ -10,7 +10,8 @@ from dataclasses import replace
 
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_regions import ClassFits, lasting_misfit, nearest_score
+from faults.diagnosis.circuits.class_regions import ClassFits, nearest_score
+from faults.diagnosis.circuits.model_doubt import lasting_misfit
 from faults.diagnosis.circuits.out_of_model import FARTHEST_OUT
 from faults.notes import AgainstCode
 from plant.notes import Note

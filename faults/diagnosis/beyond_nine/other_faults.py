@@ -36,8 +36,9 @@ from faults.diagnosis.beyond_nine.left_open import (
 from faults.diagnosis.beyond_nine.sound_circuit import Trial, largest_pressure, log_likelihood, sound_circuit
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
-from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, nominal_runs
-from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE, ClassFits, fit_classes, is_stuck
+from faults.diagnosis.circuits.class_fit import nominal_runs
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, is_stuck
+from faults.diagnosis.circuits.pressure_scale import SCALE_INFORMATION, scale_between
 from plant.arrays import Array
 from plant.notes import Note
 
@@ -262,7 +263,6 @@ def _scale_gain(blocks: Blocks, tried: Trial, sound: Trial) -> float:
 
 def _scale_log_likelihood(tried: Trial) -> float:
     """Return the log-likelihood of a circuit's scale of pressures in the condition that holds it [dimensionless]."""
-    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
-    told = float(pull @ PRESSURE_SCALE)
-    off = tried.fits.best.as_run.coordinates - tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
-    return -0.5 * (float(pull @ off) / told) ** 2 / (1.0 / told + SETTING_SPREAD**2)
+    centre = tried.actuator.conditions[int(np.argmax(tried.fits.scores))]
+    scale = scale_between(tried.fits.best.as_run.coordinates, centre)
+    return -0.5 * scale**2 / (1.0 / SCALE_INFORMATION + SETTING_SPREAD**2)

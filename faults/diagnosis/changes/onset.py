@@ -23,7 +23,8 @@ from faults.diagnosis.circuits.between_samples import with_fitted_lead
 from faults.diagnosis.circuits.blocks import LONGEST, Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import least_scales, nominal_runs
-from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes, lasting_misfit
+from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
+from faults.diagnosis.circuits.model_doubt import lasting_misfit
 from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from faults.notes import AgainstCode
 from faults.watch.events import LOSS_BALANCE, Alarm

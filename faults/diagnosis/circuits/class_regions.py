@@ -7,7 +7,7 @@ none.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -18,7 +18,6 @@ from faults.diagnosis.circuits.between_samples import spread_with_pressure
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import (
-    CONDITION_SPREAD,
     LASTING,
     LEAST_GAIN,
     LEAST_PROMISED_GAIN,
@@ -26,14 +25,14 @@ from faults.diagnosis.circuits.class_fit import (
     WEAK_PRIOR,
     PointFit,
     fit_freely,
-    least_scales,
     misfit,
     nominal_runs,
     scales_of,
     with_cost_about,
 )
 from faults.diagnosis.circuits.friction_shape import bend_covariance, bend_shifts, bent_information
-from faults.diagnosis.circuits.model_doubt import information_divisor, lasting_power
+from faults.diagnosis.circuits.model_doubt import information_divisor, lasting_misfit
+from faults.diagnosis.circuits.pressure_scale import PRESSURE_SCALE, at_likeliest_scale, spread_without_pressure
 from faults.diagnosis.circuits.region_scores import region_scores, scores_in_forces, separations, separations_in_forces
 from faults.diagnosis.circuits.rivals import (
     covariance_between_fits,
@@ -50,14 +49,7 @@ ROUGH_GAIN = 10.0
 STUCK_TRAVEL = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""
 
-ALIKE, ALIKE_COUNT = 0.25, 1.0
-"""Prior squared difference of actuators of one kind, in units of `CONDITION_SPREAD` (0.25 is some 10 % in leakage and
-friction), and the weight of that prior in deviations [dimensionless]."""
-
 _NO_FRICTION = np.array([0.0 if name.startswith("friction") else 1.0 for name in COORDINATES])
-
-PRESSURE_SCALE = np.array([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Direction in which all pressures scale without a change of motion [dimensionless]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +93,7 @@ class ClassFits:
     def spread(self) -> Array:
         """Covariance of the coordinates for intervals, shape (7, 7) [dimensionless].
 
-        See `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_of`.
+        See `faults.diagnosis.circuits.model_doubt`, and without pressure `spread_without_pressure`.
         """
         return self.compute_spread()
 
@@ -170,19 +162,10 @@ def fit_classes(
     runs = nominal_runs(blocks, actuator) if runs is None else runs
     errors = np.array([scales_of(blocks, run) for run in runs])
     nominal = np.array([misfit(blocks, run, one) for run, one in zip(runs, errors, strict=True)])
-    order = np.argsort(nominal)[: STARTS if start is None else 1]
-    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
-    gained, promising = (LEAST_GAIN, LEAST_PROMISED_GAIN) if start is None else (ROUGH_GAIN, LEAST_GAIN)
-    fits: list[PointFit] = []
-    for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
-        if not fits or not leaves_only_noise(blocks, fits[-1]):
-            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
-        elif with_cost_about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # nearer to that circuit
-            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
-    stuck, first = is_stuck(blocks, actuator), min(fits, key=lambda fit: fit.cost)
-    if start is None and blocks.pressure is not None and not stuck and is_followed_roughly(blocks, first):
-        nearest = int(np.argmax(region_scores(first, credible_information(first, blocks), actuator)))
-        fits += fits_from_other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
+    stuck = is_stuck(blocks, actuator)
+    fits = _fits_from_near_conditions(blocks, actuator, nominal, start, wanted)
+    if start is None and blocks.pressure is not None and not stuck:
+        fits += _fits_from_friction_elsewhere(blocks, actuator, fits)
     known = [credible_information(fit, blocks, stuck=stuck) for fit in fits]
     least = int(np.argmin([fit.cost for fit in fits]))
     worse = log_likelihood_behind(fits, fits[least], blocks)
@@ -194,74 +177,46 @@ def fit_classes(
         scores = [scores_in_forces(fit, one, actuator) for fit, one in zip(fits, told, strict=True)]
     likeliest = misfit(blocks, fits[least].fitted, fits[least].scales) / LASTING
     held, unbent = (np.max(np.array(one) - worse[:, None], axis=0) - likeliest for one in (scores, straight))
-    centre = actuator.conditions[np.argmax(unbent)]
-    best = fits[least] if blocks.pressure is not None else _at_likeliest_scale(fits[least], centre)
-    # without pressure, no flow balance tests for another pump or other faults, so only the regions can
-    lasting = 1.0 if blocks.pressure is None else max(1.0, lasting_misfit(best.fitted, blocks))
     if blocks.pressure is None:
-        spreading = partial(spread_of, best, known[least], blocks, centre)
+        # no flow balance tests for another pump or other faults, so only the regions can
+        centre, lasting = actuator.conditions[np.argmax(unbent)], 1.0
+        best = at_likeliest_scale(fits[least], centre)
+        spreading = partial(spread_without_pressure, best, known[least], blocks, centre)
     else:
+        best = fits[least]
+        lasting = max(1.0, lasting_misfit(best.fitted, blocks))
         seen = _NO_FRICTION if stuck else np.ones(len(COORDINATES))
         among = covariance_between_fits(fits, best, worse)
         spreading = partial(spread_with_pressure, best, blocks, actuator, unbent, seen, among)
     return ClassFits(best, known[least], nominal, errors, held, spreading, lasting, moved[least], unbent)
 
 
-def _at_likeliest_scale(fit: PointFit, centre: Array) -> PointFit:
-    """Return a fit without pressure at the scale that is most likely within a condition."""
-    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
-    shift = float(pull @ (centre - fit.coordinates)) / float(pull @ PRESSURE_SCALE)
-    return replace(fit, coordinates=fit.coordinates + shift * PRESSURE_SCALE, run_coordinates=fit.coordinates)
+def _fits_from_near_conditions(
+    blocks: Blocks, actuator: Actuator, nominal: Array, start: Array | None, wanted: float
+) -> list[PointFit]:
+    """Return the circuits found from the conditions whose nominal circuits fit best, or from a start near the first.
 
-
-def spread_of(fit: PointFit, information: Array, blocks: Blocks, centre: Array) -> Array:
-    """Return the covariance of a fit's coordinates without pressure, for intervals, including the model's error.
-
-    If the model is right, its residuals are the sensors' noise, which averages away; the error of a wrong model
-    persists. So variances grow with what remains after averaging over a tenth of a second, beyond white noise. The
-    common scale of pressure is known only as far as actuators of one kind are alike; one that differs much in what its
-    log determines is assumed to do so in the rest.
-
-    Parameters
-    ----------
-    fit : PointFit
-        The fit.
-    information : ndarray, shape (7, 7)
-        Credible information, see `credible_information`.
-    blocks : Blocks
-        Its log, without pressure.
-    centre : ndarray, shape (7,)
-        Coordinates of its condition.
-
-    Returns
-    -------
-    ndarray, shape (7, 7)
-        Covariance under the weak prior [dimensionless].
+    A search from a further condition is left out if a circuit leaves only noise, or if that circuit is as near.
     """
-    known = information / max(1.0, lasting_misfit(fit.fitted, blocks)) + np.linalg.inv(WEAK_PRIOR)
-    weight = information @ np.linalg.inv(np.eye(len(CONDITION_SPREAD)) + CONDITION_SPREAD @ information)
-    off, told = fit.coordinates - centre, float(np.trace(CONDITION_SPREAD @ weight))
-    unlike = (ALIKE_COUNT * ALIKE + float(off @ weight @ off)) / (ALIKE_COUNT + told)
-    pull = np.linalg.solve(CONDITION_SPREAD, PRESSURE_SCALE)
-    known = known + np.outer(pull, pull) / (unlike * float(pull @ PRESSURE_SCALE))
-    return np.asarray(np.linalg.inv(known), dtype=np.float64)
+    order = np.argsort(nominal)[: STARTS if start is None else 1]
+    near = [int(i) for i in order if nominal[i] <= nominal[order[0]] + len(blocks.velocity)]
+    gained, promising = (LEAST_GAIN, LEAST_PROMISED_GAIN) if start is None else (ROUGH_GAIN, LEAST_GAIN)
+    fits: list[PointFit] = []
+    for name in [list(CONDITIONS)[place] for place in near or [int(order[0])]]:
+        if not fits or not leaves_only_noise(blocks, fits[-1]):
+            fits.append(fit_freely(blocks, actuator, name, start, gained, wanted, promising))
+        elif with_cost_about(blocks, actuator, name, fits[-1]).cost < fits[-1].cost:  # nearer to that circuit
+            fits.append(fit_freely(blocks, actuator, name, fits[-1], gained))
+    return fits
 
 
-def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
-    """Return the excess of a model's residual over 0.1 s above white sensor noise.
-
-    Parameters
-    ----------
-    fitted : ndarray, shape (n, outputs)
-        Outputs of the model [m/s, Pa].
-
-    Returns
-    -------
-    float
-        Ratio of root mean squares, the largest of the outputs [dimensionless]: 1 or less for noise alone.
-    """
-    power = lasting_power((blocks.outputs - fitted)[blocks.first :])
-    return float(np.max(np.sqrt(power) / least_scales(blocks)))
+def _fits_from_friction_elsewhere(blocks: Blocks, actuator: Actuator, fits: list[PointFit]) -> list[PointFit]:
+    """Return the circuits found from the best one with other friction, if that follows the log roughly."""
+    first = min(fits, key=lambda fit: fit.cost)
+    if not is_followed_roughly(blocks, first):
+        return []
+    nearest = int(np.argmax(region_scores(first, credible_information(first, blocks), actuator)))
+    return fits_from_other_friction(blocks, actuator, first, list(CONDITIONS)[nearest])
 
 
 def is_stuck(blocks: Blocks, actuator: Actuator) -> bool:

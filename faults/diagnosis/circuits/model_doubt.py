@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks, root_mean_square
 from faults.diagnosis.circuits.circuit_runs import COLUMN, TOLERANCES, parameter_rows, predicted_outputs
-from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit, least_scales
 from plant.arrays import Array
 
 _CASE = "pump_case_leakage"
@@ -139,6 +139,23 @@ def lasting_power(left: Array) -> Array:
     parts = left[: len(left) // size * size].reshape(-1, size, left.shape[1])
     there = np.sum(np.isfinite(parts), axis=(0, 1))
     return np.asarray(np.sum(np.nansum(parts, axis=1) ** 2, axis=0) / np.maximum(there, 1), dtype=np.float64)
+
+
+def lasting_misfit(fitted: Array, blocks: Blocks) -> float:
+    """Return the excess of a model's residual over 0.1 s above white sensor noise.
+
+    Parameters
+    ----------
+    fitted : ndarray, shape (n, outputs)
+        Outputs of the model [m/s, Pa].
+
+    Returns
+    -------
+    float
+        Ratio of root mean squares, the largest of the outputs [dimensionless]: 1 or less for noise alone.
+    """
+    power = lasting_power((blocks.outputs - fitted)[blocks.first :])
+    return float(np.max(np.sqrt(power) / least_scales(blocks)))
 
 
 def residuals_of(fit: PointFit, blocks: Blocks) -> Array:

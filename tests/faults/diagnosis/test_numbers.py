@@ -21,12 +21,9 @@ from faults.diagnosis.circuits.class_fit import (
     nominal_runs,
     scales_of,
 )
-from faults.diagnosis.circuits.class_regions import (
-    credible_information,
-    is_stuck,
-    lasting_misfit,
-    spread_of,
-)
+from faults.diagnosis.circuits.class_regions import credible_information, is_stuck
+from faults.diagnosis.circuits.model_doubt import lasting_misfit
+from faults.diagnosis.circuits.pressure_scale import spread_without_pressure
 from faults.diagnosis.circuits.region_scores import region_scores
 from faults.diagnosis.not_told import not_told_notes
 from faults.diagnosis.severity import limits_of, severities, severities_at, with_bulk_modulus
@@ -187,7 +184,7 @@ def regions_of_the_classes() -> dict[str, Any]:
             "believed of a piston that stands": credible_information(fit, one, stuck=True)[np.triu_indices(7)],
             "believed of a good fit": credible_information(replace(fit, scales=one.noise), one)[0],
             "scores": region_scores(fit, INFORMATION, ACTUATOR),
-            "spread": spread_of(fit, INFORMATION, one, ACTUATOR.conditions[1])[np.triu_indices(7)],
+            "spread": spread_without_pressure(fit, INFORMATION, one, ACTUATOR.conditions[1])[np.triu_indices(7)],
             "lasting misfit": lasting_misfit(fit.fitted, one),
         }
     told["stands"] = [

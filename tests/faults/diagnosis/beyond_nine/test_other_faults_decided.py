@@ -17,7 +17,7 @@ from faults.diagnosis.calibration import shipped_calibration
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.circuit_runs import COORDINATES
 from faults.diagnosis.circuits.class_fit import PointFit
-from faults.diagnosis.circuits.class_regions import PRESSURE_SCALE
+from faults.diagnosis.circuits.pressure_scale import PRESSURE_SCALE
 from faults.diagnosis.evidence import Scoreboard
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import CircuitParameters

@@ -12,15 +12,13 @@ from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import CONDITION_SPREAD, PointFit
 from faults.diagnosis.circuits.class_regions import (
-    ALIKE,
-    PRESSURE_SCALE,
     credible_information,
     fit_classes,
     is_stuck,
-    lasting_misfit,
     nearest_score,
-    spread_of,
 )
+from faults.diagnosis.circuits.model_doubt import lasting_misfit
+from faults.diagnosis.circuits.pressure_scale import ALIKE, PRESSURE_SCALE, spread_without_pressure
 from faults.diagnosis.circuits.region_scores import region_scores, separations
 from plant.eha.model import EhaParameters
 
@@ -101,7 +99,8 @@ def test_lasting_residuals_widen_intervals_and_white_noise_does_not() -> None:
     white = np.random.default_rng(1).normal(size=100)
     lasting = np.repeat(white[:10] / np.std(white[:10]), 10)
     spreads = [
-        spread_of(*_with(left, pressure=False), ACTUATOR.conditions[0]) for left in (np.zeros(100), white, lasting)
+        spread_without_pressure(*_with(left, pressure=False), ACTUATOR.conditions[0])
+        for left in (np.zeros(100), white, lasting)
     ]
     quiet, noisy, coloured = (float(np.sqrt(spread[0, 0])) for spread in spreads)
     assert noisy < 1.3 * quiet
@@ -118,7 +117,11 @@ def test_without_pressure_an_atypical_actuator_has_a_wider_spread_of_the_pressur
     believed = credible_information(found, log)
     along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
     near, far = (
-        float(along @ spread_of(replace(found, coordinates=found.coordinates + off), believed, log, centre) @ along)
+        float(
+            along
+            @ spread_without_pressure(replace(found, coordinates=found.coordinates + off), believed, log, centre)
+            @ along
+        )
         for centre in [ACTUATOR.conditions[0]]
         for off in (np.zeros(7), np.array([0.2, -0.2, 0.2, 0.0, 0.0, 0.0, 0.0]))
     )
@@ -185,12 +188,12 @@ def test_the_lasting_misfit_compares_residuals_averaged_over_0_1_s_with_white_no
 
 def test_without_pressure_similarity_of_actuators_limits_the_spread_of_the_pressure_scale() -> None:
     found, log = residual(np.zeros(100), pressure=False)
-    spread = spread_of(found, np.zeros((7, 7)), log, ACTUATOR.conditions[0])
-    known = spread_of(found, INFORMATION, log, ACTUATOR.conditions[0])
+    spread = spread_without_pressure(found, np.zeros((7, 7)), log, ACTUATOR.conditions[0])
+    known = spread_without_pressure(found, INFORMATION, log, ACTUATOR.conditions[0])
     along = PRESSURE_SCALE / np.linalg.norm(PRESSURE_SCALE)
     assert float(along @ spread @ along) < float(along @ class_regions.WEAK_PRIOR @ along)
     assert float(along @ known @ along) < float(along @ spread @ along)
-    assert 0.05**2 < ALIKE * class_regions.CONDITION_SPREAD[0, 0] < 0.1**2
+    assert 0.05**2 < ALIKE * CONDITION_SPREAD[0, 0] < 0.1**2
 
 
 @pytest.mark.parametrize("name", [name for name in COORDINATES if name != "presliding"])
