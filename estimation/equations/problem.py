@@ -234,19 +234,18 @@ class Problem:
         theta : ndarray, shape (unknowns,)
             Coordinates [dimensionless].
         """
+        diverged = Point(theta, np.inf, np.zeros(len(theta)), np.eye(len(theta)))
         cost, gradient, gram = 0.0, np.zeros(len(theta)), np.zeros((len(theta), len(theta)))
         for errors, jacobian in self._rows(theta):
             if not (np.isfinite(errors).all() and np.isfinite(jacobian).all()):
-                return Point(theta, np.inf, np.zeros(len(theta)), np.eye(len(theta)))
+                return diverged
             size = np.abs(errors)
             weight = np.minimum(1.0, OUTLIER / np.maximum(size, OUTLIER)) if self.robust else np.ones_like(size)
             with np.errstate(all="ignore"):  # squares of finite numbers may overflow
                 cost += float(np.sum((1.0 - 0.5 * weight) * weight * errors**2))
                 gradient += jacobian.T @ (weight * errors)
                 gram += (jacobian * weight[:, None]).T @ jacobian if self.robust else jacobian.T @ jacobian
-        if not (np.isfinite(cost) and np.isfinite(gram).all()):
-            return Point(theta, np.inf, np.zeros(len(theta)), np.eye(len(theta)))
-        return Point(theta, cost, gradient, gram)
+        return Point(theta, cost, gradient, gram) if np.isfinite(cost) and np.isfinite(gram).all() else diverged
 
     def _rows(self, theta: Array) -> list[tuple[Array, Array]]:
         """Return residuals and their derivatives, log by log."""

@@ -113,8 +113,7 @@ def without_bursts(values: Array, sound: Array, noise: float) -> Array:
     there = np.isfinite(sound)
     if not np.any(lost) or np.count_nonzero(there) < REACH:
         return sound
-    window, stands = WINDOWS[-1][0], there.copy()
-    distance = np.abs(sound[there] - _running_ranks(sound[there], window, [window // 2])[0])
+    stands, distance = there.copy(), _distance_from_course(sound[there])
     stands[there] = distance > BESIDE * (percentile(distance, USUAL_PERCENT) + noise)
     near = np.convolve(lost, np.ones(2 * REACH + 1), "same") > 0.5
     return np.where(stands & near, np.nan, sound)
@@ -153,10 +152,15 @@ def without_written_for_lost(values: Array, sound: Array, noise: float) -> Array
     if counts[often] < max(FEWEST_ALIKE, MOST_ALIKE * len(stood_out)):
         return sound
     there = np.isfinite(sound)
-    window = WINDOWS[-1][0]
     distance = np.zeros(len(values))
-    distance[there] = np.abs(sound[there] - _running_ranks(sound[there], window, [window // 2])[0])
+    distance[there] = _distance_from_course(sound[there])
     return np.where((values == written[often]) & (distance > BESIDE * noise), np.nan, sound)
+
+
+def _distance_from_course(values: Array) -> Array:
+    """Return the distance of each sample from the median of the longest window around it."""
+    window = WINDOWS[-1][0]
+    return np.abs(values - _running_ranks(values, window, [window // 2])[0])
 
 
 def _running_ranks(values: Array, window: int, ranks: Sequence[int]) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from estimation.arrays import IntArray
 from estimation.log_checks.channel_names import POSITION, PRESSURE
 from estimation.log_checks.measurement_noise import is_coarse, measurement_variances, position_variance
-from faults.diagnosis.circuits.friction_shape import BEND_SPREAD, FADE_VELOCITIES
+from faults.diagnosis.circuits.friction_shape import friction_bends
 from faults.diagnosis.circuits.model_doubt import SELDOM_KNOWN
 from faults.diagnosis.severity import KnownFriction
 from plant.arrays import Array
@@ -107,8 +107,7 @@ def friction_by_forces(record: Record, p: EhaParameters, rated: float) -> KnownF
     square = (_window_means(velocity**2, first, length) - noise_v) / rated**2
     columns = np.stack([1.0 - speed, square - speed, speed, direction, direction * inertia], axis=1)
     least = p.piston_area**2 * noise_p / length + 2.0 * (p.moving_mass / time) ** 2 * noise_v
-    bends = BEND_SPREAD * np.exp(-speed[:, None] / np.array(FADE_VELOCITIES))
-    return _regress_forces(columns, direction * (pushed - inertia), least, bends)
+    return _regress_forces(columns, direction * (pushed - inertia), least, friction_bends(speed))
 
 
 def _windows(position: Array, way: Array, slides: float, length: int) -> IntArray:

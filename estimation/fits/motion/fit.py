@@ -196,10 +196,8 @@ def motion_log(
     ----------
     record : Record
         The log, with position.
-    p : EhaParameters
-        The actuator.
     uncertainties : Mapping[str, float]
-        Relative standard deviation of its parameters [fraction].
+        Relative standard deviation of the actuator's parameters [fraction].
     speed_variance : float
         Measurement variance of motor speed [rad^2/s^2].
 
@@ -287,13 +285,18 @@ def _fitted(ended: list[SearchResult], *, sparing: bool = False) -> tuple[list[G
         best = descend(whole.at, best.theta, FINISHING, bounds, wanted=wanted, least_share=SLIGHT_SHARE)
     if not asked and best.cost < explained_cost(whole):
         best, others = _rescaled(whole, best, search)
-    told = best.cost < explained_cost(whole) and not disagree([bulk_modulus(whole, best), *others])
+    told = _is_determined(whole, best, others)
     if told and not hopeful:
         best = descend(whole.at, best.theta, FINISHING, bounds)
     if told and not spared and (finer := without_chatter(whole, best.theta)) is not whole:
         whole, best = finer, descend(finer.at, best.theta, RETURNING, bounds)
-        told = best.cost < explained_cost(whole) and not disagree([bulk_modulus(whole, best), *others])
+        told = _is_determined(whole, best, others)
     return [fit_at_solution(whole, best), *_rival_fits(second, whole, best, told=told)], others, spared
+
+
+def _is_determined(problem: FreedProblem, best: Point, others: list[float]) -> bool:
+    """Return whether a point explains a log, and no other bulk modulus does [Pa]."""
+    return best.cost < explained_cost(problem) and not disagree([bulk_modulus(problem, best), *others])
 
 
 def _wanted_cost(problem: FreedProblem, begun: Point, share: float = 1.0) -> float:

@@ -17,8 +17,8 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted_outputs
-from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit, fit_freely, misfit, nominal_runs
-from faults.diagnosis.circuits.model_doubt import error_moment, residuals_of, seldom_known_slopes, seldom_known_spreads
+from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit, fit_freely, misfit, nominal_runs, normalised_rows
+from faults.diagnosis.circuits.model_doubt import error_moment, seldom_known_slopes, seldom_known_spreads
 from plant.arrays import Array
 
 ROUNDS = 3
@@ -147,9 +147,8 @@ def spread_with_pressure(
 
 def _lead_step(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float:
     """Return the step of the lead, with all coordinates free beside it [s]."""
-    slopes = np.concatenate([fit.slopes, _lead_slope(blocks, fit, actuator)[None]])[:, blocks.first :]
-    weighted = np.where(blocks.valid, slopes / fit.scales, 0.0).reshape(len(slopes), -1)
-    left = np.where(blocks.valid, residuals_of(fit, blocks) / fit.scales, 0.0).ravel()
+    slopes = np.concatenate([fit.slopes, _lead_slope(blocks, fit, actuator)[None]])
+    weighted, left = normalised_rows(blocks, fit, slopes)
     prior = np.zeros((len(slopes), len(slopes)))
     prior[:-1, :-1], prior[-1, -1] = np.linalg.inv(WEAK_PRIOR), MOST_LEAD**-2
     sample_time = blocks.sample_time * blocks.substeps

@@ -269,6 +269,24 @@ def with_cost_about(blocks: Blocks, actuator: Actuator, condition: str, fit: Poi
     return replace(fit, cost=misfit(blocks, fit.fitted) + 0.5 * float(off @ _prior_information() @ off))
 
 
+def normalised_rows(blocks: Blocks, fit: PointFit, slopes: Array) -> tuple[Array, Array]:
+    """Return slopes and residuals of a circuit for a linear step, over the size of the residuals.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (m, n, outputs)
+        Derivatives of the outputs by the unknowns of the step [m/s, Pa].
+
+    Returns
+    -------
+    tuple of ndarray, shapes (m, k) and (k,)
+        Of the blocks that count [dimensionless]; zero where an output is unknown.
+    """
+    weighted = np.where(blocks.valid, slopes[:, blocks.first :] / fit.scales, 0.0).reshape(len(slopes), -1)
+    left = np.where(blocks.valid, (blocks.outputs - fit.fitted)[blocks.first :] / fit.scales, 0.0)
+    return weighted, left.ravel()
+
+
 @cache
 def _prior_information() -> Array:
     return np.asarray(LASTING * np.linalg.inv(WEAK_PRIOR), dtype=np.float64)

@@ -37,6 +37,22 @@ FORCE_PLACES = [at for at, name in enumerate(COORDINATES) if name.startswith("fr
 """Coordinates that are forces."""
 
 
+def friction_bends(speed: Array) -> Array:
+    """Return the bends of the friction law at one standard deviation, at sliding velocities.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        Velocities over the rated one [fraction].
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Friction by each of `FADE_VELOCITIES`, over friction at rest [dimensionless].
+    """
+    return np.asarray(BEND_SPREAD * np.exp(-speed[:, None] / np.array(FADE_VELOCITIES)))
+
+
 def bend_shifts(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     """Return the response of a fit to unknown bends of the friction law.
 
@@ -52,7 +68,7 @@ def bend_shifts(fit: PointFit, blocks: Blocks, actuator: Actuator) -> Array:
     speed = np.abs(fit.fitted[blocks.first :, 0][blocks.valid[:, 0]]) / actuator.rated
     speed = np.append(speed[speed > SLIDING_VELOCITY], 0.0)  # friction at rest shows when the piston breaks loose
     parts = np.stack([np.ones_like(speed), speed, speed**2], axis=1)
-    bends = BEND_SPREAD * np.exp(-speed[:, None] / np.array(FADE_VELOCITIES))
+    bends = friction_bends(speed)
     rest, linear, quadratic = np.linalg.solve(parts.T @ parts + RIDGE * len(speed) * np.eye(3), parts.T @ bends)
     forces = np.exp(fit.coordinates[FORCE_PLACES])
     moved = np.zeros((len(fit.coordinates), len(FADE_VELOCITIES)))

@@ -13,7 +13,7 @@ import numpy as np
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted_outputs
-from faults.diagnosis.circuits.class_fit import LASTING, WEAK_PRIOR, PointFit, fit_freely
+from faults.diagnosis.circuits.class_fit import LASTING, WEAK_PRIOR, PointFit, fit_freely, normalised_rows
 from faults.diagnosis.circuits.yielding import follows_velocity
 from faults.notes import AgainstCode
 from plant.eha.circuit_parameters import CircuitParameters
@@ -107,13 +107,9 @@ def _load_step(
     moved: Callable[[float], CircuitParameters], presumed: float, blocks: Blocks, actuator: Actuator, fit: PointFit
 ) -> float:
     """Return the linear step of a load from a circuit, with all other coordinates free [unit of the load]."""
-    first, nudge = blocks.first, NUDGE * presumed
-    rows = parameter_rows(fit.coordinates[None], moved(nudge), actuator.rated)
-    columns = (
-        np.concatenate([fit.slopes, (predicted_outputs(blocks, rows) - fit.fitted) / NUDGE])[:, first:] / fit.scales
-    )
-    weighted = np.where(blocks.valid, columns, 0.0).reshape(len(columns), -1)
-    left = np.where(blocks.valid, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
-    pull = np.eye(len(columns)) * LASTING
+    rows = parameter_rows(fit.coordinates[None], moved(NUDGE * presumed), actuator.rated)
+    slopes = np.concatenate([fit.slopes, (predicted_outputs(blocks, rows) - fit.fitted) / NUDGE])
+    weighted, left = normalised_rows(blocks, fit, slopes)
+    pull = np.eye(len(slopes)) * LASTING
     pull[: len(WEAK_PRIOR), : len(WEAK_PRIOR)] = LASTING * np.linalg.inv(WEAK_PRIOR)
     return presumed * float(np.linalg.solve(weighted @ weighted.T + pull, weighted @ left)[-1])

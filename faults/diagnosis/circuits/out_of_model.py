@@ -17,7 +17,15 @@ from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.beside import beside_note
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted_outputs
-from faults.diagnosis.circuits.class_fit import LASTING, SEAL_SPREAD, STEP, WEAK_PRIOR, PointFit, fit_freely
+from faults.diagnosis.circuits.class_fit import (
+    LASTING,
+    SEAL_SPREAD,
+    STEP,
+    WEAK_PRIOR,
+    PointFit,
+    fit_freely,
+    normalised_rows,
+)
 from faults.diagnosis.circuits.class_regions import ClassFits
 from faults.diagnosis.circuits.load_or_offset import load_for_offset
 from faults.diagnosis.circuits.not_shown import FRICTION_LAW, undetermined_coordinates
@@ -204,7 +212,6 @@ def _linear_biases(
     blocks: Blocks, fit: PointFit, trust: float, actuator: Actuator, sizes: Mapping[str, float]
 ) -> Mapping[str, tuple[float, float]]:
     """Return the pump's relative delivery and each sensor's bias, with errors, by one linear step from a fit."""
-    first = blocks.first
     rows = parameter_rows(fit.coordinates[None], actuator.circuit, actuator.rated)
     nudge = 0.01 * sizes["motor_speed_rad_s"]
     faster = predicted_outputs(replace(blocks, speed=blocks.speed + nudge), rows)[0]
@@ -213,8 +220,7 @@ def _linear_biases(
     columns = [*fit.slopes, (larger - fit.fitted) / STEP, (faster - fit.fitted) / nudge]
     if blocks.pressure is not None:
         columns.append(np.column_stack([np.zeros(len(blocks.velocity)), np.ones(len(blocks.velocity))]))
-    weighted = np.where(blocks.valid, np.array(columns)[:, first:] / fit.scales, 0.0).reshape(len(columns), -1)
-    left = np.where(blocks.valid, (blocks.outputs - fit.fitted)[first:] / fit.scales, 0.0).ravel()
+    weighted, left = normalised_rows(blocks, fit, np.array(columns))
     pull, pump = np.zeros((len(columns), len(columns))), len(WEAK_PRIOR)
     pull[:pump, :pump] = np.linalg.inv(WEAK_PRIOR)
     pull[pump, pump] = 1.0 / FREE_PUMP**2
