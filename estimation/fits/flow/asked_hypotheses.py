@@ -133,6 +133,25 @@ def hypotheses_asked(
     all_strange = (*HYPOTHESES, MAKEUP_BENDS) if outruns_pump(log, parameters) else HYPOTHESES
     if not fit_explains(swinging, log.passes_on) or latest_channel(swinging.late)[2] > REQUIRED_GAIN:
         return (BEGUN_UNDER_LOAD,) if moving else all_strange, ()
+    asked, delivery = _promising_hypotheses(log, parameters, swinging, best, sensed, worth)
+    remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
+    if at_widest(swinging, parameters, log):
+        return (BEGUN_UNDER_LOAD,) if moving else all_strange, remarks
+    if moving:
+        loaded = _may_begin_under_load(log, parameters, swinging, best)
+        return (BEGUN_UNDER_LOAD, *asked) if loaded else asked, remarks
+    return HYPOTHESES if not log.passes_on and exceeds_noise(swinging) else asked, remarks
+
+
+def _promising_hypotheses(
+    log: GreyBoxLog,
+    parameters: EhaParameters,
+    swinging: GreyBoxFit,
+    best: GreyBoxFit,
+    sensed: ShownPlay,
+    worth: float,
+) -> tuple[tuple[Hypothesis, ...], PredictedGain]:
+    """Return the hypotheses worth a test though the plain form explains the log, and what another delivery promises."""
     by_mass = balances_mass(swinging.model)
     promises = predicted_gains(
         log.stepped(swinging.steps),
@@ -160,19 +179,20 @@ def hypotheses_asked(
     tried = (DELIVERY, worn), (sought, shifted), (PLAY, plays), (SPEED_LATE, behind), (PRESSURE_LATE, ahead)
     asked = tuple(one for one, worthwhile in tried if worthwhile)
     asked += tuple(one for one, promise in zip(MAY_HIDE, hidden, strict=True) if promise.gain > worth)
-    asked += tuple(one for one in _late_valves(swinging) if one not in asked)
-    remarks = open_wear_note(delivery, share_lost(log, swinging.values, parameters.pump_displacement))
-    if at_widest(swinging, parameters, log):
-        return (BEGUN_UNDER_LOAD,) if moving else all_strange, remarks
-    if not moving:
-        return HYPOTHESES if not log.passes_on and exceeds_noise(swinging) else asked, remarks
-    # chambers shut in far above the accumulator draw no make-up flow for seconds; a search from rest then loses it
+    return asked + tuple(one for one in _late_valves(swinging) if one not in asked), delivery
+
+
+def _may_begin_under_load(log: GreyBoxLog, parameters: EhaParameters, swinging: GreyBoxFit, best: GreyBoxFit) -> bool:
+    """Return whether a log that begins in motion may begin under load.
+
+    Chambers shut in far above the accumulator draw no make-up flow for seconds; a search from rest then loses it.
+    """
     fed = swinging.values["makeup_conductance"] > VANISHED * parameters.makeup_conductance
-    lost = swinging is best and not fed and exceeds_noise(swinging)
+    if swinging is best and not fed and exceeds_noise(swinging):
+        return True
+    by_mass = balances_mass(swinging.model)
     begun = predicted_gain(log.coarsened(), parameters, swinging.values, START_LOAD, by_mass=by_mass)
-    return (BEGUN_UNDER_LOAD, *asked) if lost or _possible_gains([begun], swinging)[
-        0
-    ].gain > REQUIRED_GAIN else asked, remarks
+    return _possible_gains([begun], swinging)[0].gain > REQUIRED_GAIN
 
 
 def at_widest(fit: GreyBoxFit, parameters: EhaParameters, log: GreyBoxLog) -> bool:

@@ -111,16 +111,7 @@ def explain(
     if paired and homed:
         finished = _distinct([*finished, *with_zero(wide, finished[0], spared, accepted)])
     if paired and finished[0].cost < hopeless and not _explains_by_itself(wide, finished[0], accepted):
-        first, second = finished[0], finished[1] if len(finished) > 1 else None
-        pairs = _hypothesis_pairs(wide, first, starts[0], accepted)
-        near = cost_over_noise(wide, first.cost) < NEARLY_BEST or (pairs and is_explained(pairs[0], accepted))
-        as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _is_same_fit(first, second)
-        sought = not (pairs and is_explained(pairs[0], accepted) and cost_over_noise(wide, pairs[0].cost) < NOISE_COST)
-        if second and near and as_good and sought:
-            pairs += _hypothesis_pairs(
-                wide, second, starts[0], accepted, rivalled=min(one.cost for one in (first, *pairs))
-            )
-        finished = _distinct([first, *pairs])
+        finished = _best_and_pairs(wide, finished, starts[0], accepted)
         if begun := [one for one in asked if one.from_first_sample and one.free == START_LOAD.free]:
             finished = _distinct([*finished, *rig_and_load(wide, begun[0], finished[0], spared, accepted)])
         finished = _distinct([with_pressure_filter(wide, finished[0]), *finished])
@@ -169,6 +160,26 @@ def _single_hypotheses(
     known = finished[0].cost
     more = screened_hypotheses(log, others, starts, promising_starts(starts, begun), known, every)
     return ranked([*finished, *likeliest_sets(log, more, known, spared)])
+
+
+def _best_and_pairs(
+    log: GreyBoxLog, singles: Sequence[Trial], plain: Mapping[str, float], accepted: Accepted
+) -> list[Trial]:
+    """Return the best single hypothesis, and the pairs that explain a log better than it.
+
+    Pairs with the second best are tried too if it is about as good, unless a pair with the best explains the log to the
+    noise, or leaves so much that no pair will explain it.
+    """
+    first, second = singles[0], singles[1] if len(singles) > 1 else None
+    pairs = _hypothesis_pairs(log, first, plain, accepted)
+    explained = bool(pairs) and is_explained(pairs[0], accepted)
+    near = explained or cost_over_noise(log, first.cost) < NEARLY_BEST
+    sought = not (explained and cost_over_noise(log, pairs[0].cost) < NOISE_COST)
+    as_good = second and second.cost <= NEARLY_AS_GOOD * first.cost and not _is_same_fit(first, second)
+    if second and near and as_good and sought:
+        least = min(one.cost for one in (first, *pairs))
+        pairs += _hypothesis_pairs(log, second, plain, accepted, rivalled=least)
+    return _distinct([first, *pairs])
 
 
 def _hypothesis_pairs(
