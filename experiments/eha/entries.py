@@ -168,39 +168,9 @@ def _no_class_message(found: "Finding") -> str:
 
 def estimate_message(found: "Finding") -> str:
     """Return the result of `estimate` for a log as one sentence."""
-    from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
-    from estimation.log_checks.channel_names import PRESSURE
-    from estimation.log_checks.notes import LoggerCode
-    from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
-
     modulus = found.quantities["bulk_modulus"]
     if modulus.value is None or modulus.ci95 is None:
-        reasons = found.gate.reasons
-        mistakes = [str(note) for note in reasons if isinstance(note.code, ChannelCode)]
-        if mistakes:
-            return clauses(mistakes)
-        seen = found.outcome is Outcome.NOT_OBSERVABLE and PRESSURE in found.channels
-        volume = next((str(note) for note in found.notes if note.code == RigCode.VOLUME_DIFFERS), None)
-        if seen and volume:
-            return clauses(
-                [f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"]
-            )
-        at_rest = {
-            EstimateCode.PUMP_AND_PISTON_REST,
-            EstimateCode.POSITION_CONSTANT,
-            EstimateCode.PISTON_STANDS_STILL,
-            EstimateCode.STILL_AND_FOREIGN,
-        }
-        still = [str(note) for note in reasons if note.code in at_rest]
-        if seen and still:
-            return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])
-        unexplained = seen and any(note.code != EstimateCode.BOUND_TOO_WIDE for note in reasons)
-        if unexplained or (found.outcome is Outcome.MISMATCH and reasons):
-            told = list(map(str, reasons))
-            if all(isinstance(note.code, (SensorCode, LoggerCode)) for note in reasons):
-                return clauses([f"no value of bulk modulus: {told[0]}", *told[1:]])
-            return clauses(["no value of bulk modulus: the model does not describe the log", *told])
-        return clauses([NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
+        return _no_value_message(found)
     low, high = (1e-6 * end for end in modulus.ci95)
     digits = decimals_of(low, high)
     said = [
@@ -212,6 +182,39 @@ def estimate_message(found: "Finding") -> str:
     if not found.gate.passed:
         said.append(f"do not rely on it: {clauses(str(note) for note in found.gate.reasons)}")
     return clauses(said)
+
+
+def _no_value_message(found: "Finding") -> str:
+    """Return why a log gives no value of bulk modulus; a mistake in a channel comes first."""
+    from estimation.finding import NOT_OBSERVABLE_WITH_PRESSURE, OUTCOMES, Outcome
+    from estimation.log_checks.channel_names import PRESSURE
+    from estimation.log_checks.notes import LoggerCode
+    from estimation.notes import ChannelCode, EstimateCode, RigCode, SensorCode
+
+    reasons = found.gate.reasons
+    mistakes = [str(note) for note in reasons if isinstance(note.code, ChannelCode)]
+    if mistakes:
+        return clauses(mistakes)
+    seen = found.outcome is Outcome.NOT_OBSERVABLE and PRESSURE in found.channels
+    volume = next((str(note) for note in found.notes if note.code == RigCode.VOLUME_DIFFERS), None)
+    if seen and volume:
+        return clauses([f"no value of bulk modulus: {volume}; correct chamber_volume, then estimate this log again"])
+    at_rest = {
+        EstimateCode.PUMP_AND_PISTON_REST,
+        EstimateCode.POSITION_CONSTANT,
+        EstimateCode.PISTON_STANDS_STILL,
+        EstimateCode.STILL_AND_FOREIGN,
+    }
+    still = [str(note) for note in reasons if note.code in at_rest]
+    if seen and still:
+        return clauses([f"no value of bulk modulus: {still[0]}", *still[1:]])
+    unexplained = seen and any(note.code != EstimateCode.BOUND_TOO_WIDE for note in reasons)
+    if unexplained or (found.outcome is Outcome.MISMATCH and reasons):
+        told = list(map(str, reasons))
+        if all(isinstance(note.code, (SensorCode, LoggerCode)) for note in reasons):
+            return clauses([f"no value of bulk modulus: {told[0]}", *told[1:]])
+        return clauses(["no value of bulk modulus: the model does not describe the log", *told])
+    return clauses([NOT_OBSERVABLE_WITH_PRESSURE if seen else OUTCOMES[found.outcome]])
 
 
 def costs(results: Iterable[Mapping[str, Any]]) -> list[str]:

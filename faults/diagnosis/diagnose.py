@@ -4,7 +4,7 @@ It continues `estimation.eha.estimate.estimate_log`: the log is checked once and
 gate rejects the fit, the class is unknown for the same reasons.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.eha.another_rod import is_of_another_rod
 from estimation.eha.bulk_modulus import EstimateOptions
-from estimation.eha.entrained_air import amount_of_air, with_air
-from estimation.eha.estimate import checked_estimate, explanation_and_remarks, finding_of, rejection_notes
-from estimation.eha.explanation_notes import FAULTS_BEYOND_CONDITIONS, corrected_log, corrected_rig, log_at_pump_speed
+from estimation.eha.entrained_air import amount_of_air
+from estimation.eha.estimate import checked_estimate, finding_of
 from estimation.eha.result import BulkModulusEstimate
-from estimation.eha.rig_share import SOFT_OIL_RATIO, scaled_responses, with_total
+from estimation.eha.rig_share import scaled_responses, with_total
 from estimation.finding import Finding, Outcome, Quantity
 from estimation.log_checks.channel_names import PRESSURE
 from estimation.log_checks.clean import CleanLog, clean_log
@@ -36,6 +34,7 @@ from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import actuator_of
 from faults.diagnosis.circuits.blocks import LONGEST
+from faults.diagnosis.corrected_case import CorrectedCase, corrected_case
 from faults.diagnosis.doubtful_entries import doubtful_entries
 from faults.diagnosis.failed_search import doubts_after_fit
 from faults.diagnosis.known_losses import with_balance_severities
@@ -104,7 +103,7 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     asked = seen is None and not log.mistakes  # otherwise not needed, or the mistake is known
     plain = _begin_plain(log, rig.parameters) if asked else _Plain(log, rig.parameters, None, None)
     estimate = checked_estimate(log, rig, EstimateOptions())[1] if seen is None else seen[1]
-    found, case = finding_of(log, estimate, rig), _corrected_case(log, rig, estimate)
+    found, case = finding_of(log, estimate, rig), corrected_case(log, rig, estimate)
     again, cleaned = partial(diagnose_log, record, rig), log
     if (sound := without_wrong_velocity(cleaned, (), estimate, case.strange)) is not None:  # it froze or reads 0
         return again((sound, estimate))
@@ -138,62 +137,27 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     if stands is not None:
         left, found = (), replace(found, notes=(*found.notes, stands))
     still = standstill_notes(log.record, case.healthy, diagnosis.not_told)
+    return _with_class(found, case, diagnosis, _reasons_against(diagnosis, left, still, verdict.against))
+
+
+def _reasons_against(
+    diagnosis: Diagnosis, left: Sequence[Note], still: Sequence[Note], misfits: Sequence[Note]
+) -> tuple[Note, ...]:
+    """Return the reasons against all nine conditions once circuits are fitted.
+
+    ``left`` are the doubts that the circuits leave, ``still`` those of a piston that stands still, and ``misfits``
+    those of the nominal models.
+    """
     # a piston that stands still shows no friction, so friction cannot be outside the nine conditions
     follow = tuple(note for note in diagnosis.against if not (still and note.code in OUTSIDE_CODES))
     against = distinct((*still, *left, *follow))
     # other oil also makes the nominal models misfit, so their misfit is no objection by itself, but it supports others
     if against and not still:
-        against = distinct((*against, *verdict.against))
-    likelier = likelier_fault_notes(diagnosis.probabilities, diagnosis.not_told)
-    return _with_class(found, case, diagnosis, distinct((*against, *likelier)))
+        against = distinct((*against, *misfits))
+    return distinct((*against, *likelier_fault_notes(diagnosis.probabilities, diagnosis.not_told)))
 
 
-class _Case(NamedTuple):
-    """A log and its rig, corrected for the effects that explain the log.
-
-    Circuits are fitted around ``rig``, which has the measured oil if that contains air or is unlike the file's.
-    Severities are relative to ``healthy``. ``strange`` has the notes on rig, oil and logger. ``written`` is the rig
-    file. Nominal models, which have no air, use the actuator as a whole.
-    """
-
-    log: CleanLog
-    rig: Rig
-    healthy: EhaParameters
-    written: EhaParameters
-    estimate: BulkModulusEstimate
-    strange: tuple[Note, ...]
-
-    @property
-    def with_whole_oil(self) -> EhaParameters:
-        """The actuator with the bulk modulus of its oil, air included."""
-        if self.healthy.bulk_modulus == self.rig.parameters.bulk_modulus or self.estimate.value is None:
-            return self.healthy
-        return replace(self.healthy, bulk_modulus=self.estimate.value)
-
-    @property
-    def doubts(self) -> tuple[Note, ...]:
-        """Reasons against all nine conditions before a circuit is fitted."""
-        outside = (note for note in self.strange if note.code in FAULTS_BEYOND_CONDITIONS or is_of_another_rod(note))
-        return (*rejection_notes(self.estimate), *outside, *self.log.objections)
-
-
-def _corrected_case(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> _Case:
-    written = rig.parameters
-    strange = explanation_and_remarks(estimate, written)
-    log = log_at_pump_speed(log, estimate.turning)
-    if estimate.explanation is not None:
-        log = corrected_log(log, estimate.explanation)
-        rig = replace(rig, parameters=corrected_rig(rig.parameters, estimate.explanation))
-    healthy = rig.parameters
-    around = with_air(healthy, estimate.explanation)
-    of_oil = around.bulk_modulus if around is not healthy else estimate.value
-    if (other := _other_oil_note(of_oil, estimate, healthy)) is not None:
-        strange = (*strange, other)
-        around = replace(around, bulk_modulus=of_oil)
-    return _Case(log, replace(rig, parameters=around), healthy, written, estimate, strange)
-
-
-def _with_class(found: Finding, case: _Case, diagnosis: Diagnosis, against: tuple[Note, ...]) -> Finding:
+def _with_class(found: Finding, case: CorrectedCase, diagnosis: Diagnosis, against: tuple[Note, ...]) -> Finding:
     """Return a finding with its condition, how bad it is, and what to do."""
     notes, board = found.notes, diagnosis.scoreboard
     if (stop := board.blocks.stop) is not None:
@@ -279,7 +243,9 @@ def _diagnose_clean_log(log: CleanLog, parameters: EhaParameters) -> Diagnosis:
     return diagnose_clean(log, actuator_of(parameters))
 
 
-def _diagnose_with_delivery(log: CleanLog, parameters: EhaParameters, case: _Case, plain: _Plain) -> LoadedDiagnosis:
+def _diagnose_with_delivery(
+    log: CleanLog, parameters: EhaParameters, case: CorrectedCase, plain: _Plain
+) -> LoadedDiagnosis:
     """Return a diagnosis with the pump delivery from the flow balance."""
     around = partial(_diagnose_around, log, estimate=case.estimate, plain=plain)
     found = with_fitted_accumulator(around(parameters), around)
@@ -302,19 +268,6 @@ def _diagnose_around(
     if estimate.form != "flow" or not estimate.gate.passed:
         return LoadedDiagnosis(of(parameters, 0.0), parameters)
     return with_rod_load(of, parameters, estimate)
-
-
-def _other_oil_note(value: float | None, estimate: BulkModulusEstimate, healthy: EhaParameters) -> Note | None:
-    """Return a note if the oil, without its air, is unlike the rig's: the circuit is fitted around the measured oil.
-
-    Stiff oil is no fault. Soft oil shows in its severity, the air that would make it so soft.
-    """
-    if not estimate.gate.passed or value is None:
-        return None
-    ratio = value / healthy.bulk_modulus
-    if SOFT_OIL_RATIO <= ratio <= 1.0 / SOFT_OIL_RATIO:
-        return None
-    return (RigCode.OIL_SOFTER if ratio < 1.0 else RigCode.OIL_STIFFER).note(ratio=ratio)
 
 
 def _severities(

@@ -12,7 +12,7 @@ from estimation.finding import Finding, Gate, Outcome
 from estimation.log_checks.clean import clean_log
 from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
-from faults.diagnosis import by_circuits, diagnose, known_losses
+from faults.diagnosis import by_circuits, corrected_case, diagnose, known_losses
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
@@ -90,7 +90,7 @@ def test_a_channel_with_a_wrong_sign_gives_no_probabilities_and_advice_on_the_co
 
 def test_a_refused_fit_makes_the_class_unknown_for_the_same_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     why = EstimateCode.BOUND_TOO_WIDE.note()
-    monkeypatch.setattr(diagnose, "rejection_notes", lambda _: (why,))
+    monkeypatch.setattr(corrected_case, "rejection_notes", lambda _: (why,))
     found = diagnose_log(log(), RIG)
     assert found.unknown
     assert found.against[0] == why
@@ -106,7 +106,7 @@ def test_an_objection_of_nominal_models_counts_only_beside_another_objection(mon
 
     monkeypatch.setattr(diagnose, "models_verdict", objecting)
     assert not diagnose_log(log(), RIG).unknown
-    monkeypatch.setattr(diagnose, "rejection_notes", lambda _: (EstimateCode.BOUND_TOO_WIDE.note(),))
+    monkeypatch.setattr(corrected_case, "rejection_notes", lambda _: (EstimateCode.BOUND_TOO_WIDE.note(),))
     assert poor in diagnose_log(log(), RIG).against
 
 
