@@ -167,7 +167,9 @@ def severities(
     among = circuits or [OpenCircuit(fits.best.coordinates, 1.0)]
     if known is not None:
         among = [one._replace(coordinates=np.append(known.logarithms, one.coordinates[2:])) for one in among]
-    straight, curved = (None, None) if rubbing is None else ((rubbing.forces, one) for one in rubbing[1:])
+    straight = curved = None
+    if rubbing is not None:
+        straight, curved = (rubbing.forces, rubbing.covariance), (rubbing.forces, rubbing.bent_covariance)
     found = _drawn_severities(_with_known_losses(fits.spread, known), among, actuator, widths or {}, straight)
     if not np.any(fits.bend_shifts):
         return found
