@@ -5,6 +5,8 @@ leakage and friction may take any share. Pumped oil moves the piston, and compre
 counts only if it is near that of a slip of units, and far from what a wrong rig file can explain.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from estimation.log_checks.channel_blocks import (
@@ -133,24 +135,31 @@ def _motions_disagree(short: ChannelBlocks, long: ChannelBlocks, p: EhaParameter
         channel = against[0] if len(against) == 1 else f"{VELOCITY} or {POSITION}"
         other = POSITION if channel == VELOCITY else VELOCITY
         found.append(ChannelCode.CHANNEL_REVERSED.note(channel=channel, against=other, correlation=same))
-    factor = matching_slip(abs(ratio), LENGTHS)
+    swept = {name: p.piston_area * abs(size) for name, (_, size) in with_pump.items()}
+    return (*found, *_unlike_motion_notes(abs(ratio), swept))
+
+
+def _unlike_motion_notes(ratio: float, swept: Mapping[str, float]) -> tuple[Note, ...]:
+    """Return a note if position and velocity differ by a unit: the one by which a piston sweeps too much is wrong.
+
+    ``ratio`` is the size of the slope of position over that of velocity, ``swept`` what a piston would sweep by each,
+    over the volume pumped.
+    """
+    factor = matching_slip(ratio, LENGTHS)
     if factor is not None:
         large, small = (POSITION, VELOCITY) if factor > 1.0 else (VELOCITY, POSITION)
-        too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
-        guilty, other = (large, small) if too_far else (small, large)
-        times = abs(ratio) if guilty == POSITION else 1.0 / abs(ratio)
-        slip = factor if guilty == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
-        found.append(unit_note(guilty, other, times, LENGTHS[slip]))
-    elif (
-        not 1.0 / LEAST_DISAGREEMENT <= abs(ratio) <= LEAST_DISAGREEMENT
-    ):  # such as a furlong read as a metre: only a pump shows which is wrong
-        large, small = (POSITION, VELOCITY) if abs(ratio) > 1.0 else (VELOCITY, POSITION)
-        too_far = p.piston_area * abs(with_pump[large][1]) > FARTHEST
-        guilty = large if too_far else f"{large} or {small}"
-        times = max(abs(ratio), 1.0 / abs(ratio))
-        inches = matching_slip(times, INCHES, 0.95, 1.05)
-        found.append(unit_note(guilty, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]))
-    return tuple(found)
+        wrong, other = (large, small) if swept[large] > FARTHEST else (small, large)
+        times = ratio if wrong == POSITION else 1.0 / ratio
+        slip = factor if wrong == POSITION else min(LENGTHS, key=lambda one: abs(np.log(one * factor)))
+        return (unit_note(wrong, other, times, LENGTHS[slip]),)
+    if 1.0 / LEAST_DISAGREEMENT <= ratio <= LEAST_DISAGREEMENT:
+        return ()
+    # such as a furlong read as a metre: only a pump shows which is wrong
+    large, small = (POSITION, VELOCITY) if ratio > 1.0 else (VELOCITY, POSITION)
+    wrong = large if swept[large] > FARTHEST else f"{large} or {small}"
+    times = max(ratio, 1.0 / ratio)
+    inches = matching_slip(times, INCHES, 0.95, 1.05)
+    return (unit_note(wrong, small, times, UNKNOWN_UNIT if inches is None else INCHES[inches]),)
 
 
 def _wrong_sign_notes(
