@@ -59,8 +59,6 @@ def channel_blocks(record: Record, p: EhaParameters, length: float) -> ChannelBl
 
     Parameters
     ----------
-    record : Record
-        The log.
     p : EhaParameters
         The actuator, for its pump.
     length : float

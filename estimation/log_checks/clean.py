@@ -84,8 +84,6 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
 
     Parameters
     ----------
-    record : Record
-        The log.
     parameters : EhaParameters
         The actuator, for its relief valve and for the motion due to its pump.
 

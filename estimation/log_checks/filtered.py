@@ -54,8 +54,6 @@ def without_correlated_noise(record: Record, rings_at: float = 0.0) -> tuple[Rec
 
     Parameters
     ----------
-    record : Record
-        The log.
     rings_at : float
         Natural frequency of the piston on its oil [Hz]. A log in which it is near the bands is unchanged.
 

@@ -32,8 +32,6 @@ def first_belief(model: ProcessModel, record: Record, start: float, start_std: f
     ----------
     model : ProcessModel
         The process model.
-    record : Record
-        The log.
     start : float
         First guess of effective bulk modulus [Pa].
     start_std : float

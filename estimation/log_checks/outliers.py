@@ -239,8 +239,6 @@ def without_gross_outliers(record: Record, channels: Sequence[str]) -> tuple[Rec
 
     Parameters
     ----------
-    record : Record
-        The log.
     channels : sequence of str
         Channels to check; those that the log lacks are ignored.
 

@@ -73,8 +73,6 @@ def sensor_objections(record: Record, parameters: EhaParameters) -> tuple[Note, 
 
     Parameters
     ----------
-    record : Record
-        The log.
     parameters : EhaParameters
         The actuator, for the motion due to its pump.
 

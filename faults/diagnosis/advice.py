@@ -81,8 +81,6 @@ def advice_for(
 
     Parameters
     ----------
-    record : Record
-        The log.
     probabilities : Mapping[str, float]
         Probability of each condition [probability]; empty if there are none.
     against : iterable of Note

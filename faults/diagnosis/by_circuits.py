@@ -24,8 +24,6 @@ def diagnose_clean(log: CleanLog, actuator: Actuator, calibration: Calibration |
     ----------
     log : CleanLog
         Motor speed, and position or velocity; differential pressure where it is logged.
-    actuator : Actuator
-        The healthy actuator.
     calibration : Calibration, optional
         Fitted numbers; those shipped if not given.
 

@@ -94,10 +94,6 @@ def weigh_evidence(record: Record, actuator: Actuator, library: Mapping[str, Lin
 
     Parameters
     ----------
-    record : Record
-        The log.
-    actuator : Actuator
-        The healthy actuator.
     library : Mapping[str, LinearModel], optional
         Transfer functions of the nine conditions of this actuator; without it that evidence is absent.
 

@@ -51,8 +51,6 @@ def doubts_after_fit(
         Objections before the fit.
     estimate : BulkModulusEstimate
         The estimate whose gate raised some of them.
-    log : CleanLog
-        The log.
     healthy : EhaParameters
         The actuator around which the circuit was fitted.
     board : Scoreboard

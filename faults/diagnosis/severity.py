@@ -88,8 +88,6 @@ def severities_at(point: Array, actuator: Actuator) -> Mapping[str, float]:
     ----------
     point : ndarray, shape (7,)
         Its coordinates.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -145,8 +143,6 @@ def severities(
     ----------
     fits : ClassFits
         The fit.
-    actuator : Actuator
-        The healthy actuator.
     widths : Mapping[str, float], optional
         Factor on each interval [dimensionless]; 1 if not given.
     circuits : sequence of OpenCircuit, optional
@@ -305,8 +301,6 @@ def with_bulk_modulus(found: Mapping[str, Quantity], estimated: Quantity, actuat
         Severities of a circuit.
     estimated : Quantity
         Effective bulk modulus [Pa]; without a value if the log does not determine it.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -53,10 +53,8 @@ def presumed_stiffness(p: EhaParameters, uncertainties: Mapping[str, float]) -> 
 
     Parameters
     ----------
-    p : EhaParameters
-        The actuator.
     uncertainties : Mapping[str, float]
-        Relative standard deviation of its parameters [fraction].
+        Relative standard deviation of the actuator's parameters [fraction].
 
     Returns
     -------

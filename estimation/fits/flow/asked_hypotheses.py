@@ -104,8 +104,6 @@ def hypotheses_asked(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     swinging, best : GreyBoxFit
         The best fit with varying volumes, and the best fit of all.
     sensed : ShownPlay
@@ -227,8 +225,6 @@ def hypotheses_tested_alone(plain: PlainFits, asked: Sequence[Hypothesis]) -> tu
 
     Parameters
     ----------
-    plain : PlainFits
-        Fits of the plain form.
     asked : sequence of Hypothesis
         The hypotheses that are tested together. If these are not all, nothing is tested alone.
     """

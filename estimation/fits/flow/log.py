@@ -152,10 +152,8 @@ def flow_log(
     ----------
     record : Record
         The log, without gross outliers.
-    parameters : EhaParameters
-        The actuator.
     uncertainties : Mapping[str, float]
-        Relative standard deviation of its parameters [fraction].
+        Relative standard deviation of the actuator's parameters [fraction].
     variances : Mapping[str, float]
         Of the noise of the channels [SI squared].
     held : bool
@@ -244,8 +242,6 @@ def with_random_walk(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     values : Mapping[str, float]
         Bulk modulus and leakage coefficient of a first fit [SI].
     stiffest : float

@@ -78,8 +78,6 @@ def lower_minimum(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     fit : GreyBoxFit
         The fit of the plain form.
     found : Mapping[str, tuple of float]

@@ -195,8 +195,6 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
 
     Parameters
     ----------
-    logged : Logged
-        The log.
     start : FitStart
         Where searches begin.
     near : sequence of GreyBoxFit

@@ -55,8 +55,6 @@ def with_pump_correction_at(means: GreyBoxLog, p: EhaParameters, values: Mapping
     ----------
     means : GreyBoxLog
         The log, as `with_pump_correction` returns it.
-    p : EhaParameters
-        The actuator.
     values : Mapping[str, float]
         Parameters of a first fit [SI].
 

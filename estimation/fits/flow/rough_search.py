@@ -89,8 +89,6 @@ def rough_optima(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     starts : sequence of Mapping[str, float]
         Where searches begin [SI].
 

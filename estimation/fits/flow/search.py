@@ -127,8 +127,6 @@ def balance_fits(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     starts : sequence of Mapping[str, float]
         Where searches begin, see `flow_starts` [SI].
     valley : Mapping[str, float], optional
@@ -181,8 +179,6 @@ def refitted_balances(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     fits : sequence of GreyBoxFit
         The fits of the other log, as from `balance_fits`.
     stiffest : float

@@ -36,8 +36,6 @@ def with_sweep_correction(log: GreyBoxLog, parameters: EhaParameters, values: Ma
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     values : Mapping[str, float]
         Bulk modulus and leakage coefficient of a first fit [SI].
 
@@ -65,8 +63,6 @@ def with_first_fit(
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     values : Mapping[str, float]
         Parameters of the first fit [SI].
     stiffest : float

@@ -37,8 +37,6 @@ def with_turns_read(log: GreyBoxLog, parameters: EhaParameters) -> GreyBoxLog:
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     """
     if log.sample_time < SLOW or log.gaps.size:
         return log

@@ -19,8 +19,6 @@ def outruns_pump(log: GreyBoxLog, p: EhaParameters) -> bool:
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    p : EhaParameters
-        The actuator.
     """
     speed, position = (log.drives[:, FLOW_FORM.drives.index(name)] for name in FLOW_FORM.drives)
     samples = min(max(1, round(OUTRUN_SPAN / log.sample_time)), len(position) - 1)
@@ -35,7 +33,5 @@ def opens_wide(log: GreyBoxLog, p: EhaParameters) -> bool:
     ----------
     log : GreyBoxLog
         The log, as the flow form sees it.
-    p : EhaParameters
-        The actuator.
     """
     return p.pilot_share > 0.0 or outruns_pump(log, p)

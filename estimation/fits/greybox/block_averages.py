@@ -95,8 +95,6 @@ def averaged_log(log: GreyBoxLog, longest_step: float, block: int | None = None)
 
     Parameters
     ----------
-    log : GreyBoxLog
-        The log.
     longest_step : float
         Longest step of the model [s].
     block : int, optional

@@ -84,8 +84,6 @@ class FreedProblem(Problem):
         ----------
         model : GreyBoxModel
             The model, its unknowns fields of its parameters.
-        log : GreyBoxLog
-            The log.
         """
         return cls(replace(model, unknowns=(), linear=()), log, model.unknowns, dict(model.linear))
 

@@ -72,8 +72,6 @@ def explain(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     starts : sequence of Mapping[str, float]
         First guesses of the plain form's unknowns [SI].
     accepted : callable

@@ -158,8 +158,6 @@ def loss_signals(log: GreyBoxLog, parameters: EhaParameters) -> LossSignals:
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
 
     Returns
     -------

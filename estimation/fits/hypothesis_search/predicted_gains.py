@@ -59,8 +59,6 @@ def predicted_gain(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     plain : Mapping[str, float]
         Parameters of the plain fit [SI].
     one : Hypothesis
@@ -86,8 +84,6 @@ def predicted_gains(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     plain : Mapping[str, float]
         Parameters of the plain fit [SI].
     asked : sequence of Hypothesis

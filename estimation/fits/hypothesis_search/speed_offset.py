@@ -72,8 +72,6 @@ def offset_by_lost_flow(log: GreyBoxLog, parameters: EhaParameters) -> float:
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
 
     Returns
     -------

@@ -112,8 +112,6 @@ def varying_loss(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it; its speed has no gaps.
-    parameters : EhaParameters
-        The actuator.
     starts : sequence of Mapping[str, float]
         Where searches begin; regressors are compared at the first, where the plain form ended [SI].
     explains : callable

@@ -52,8 +52,6 @@ def widened_log(
     ----------
     log : GreyBoxLog
         The log, as the plain flow form sees it.
-    parameters : EhaParameters
-        The actuator.
     found : Mapping[str, float], optional
         Parameters of the plain fit; `HELD_PARAMETERS` ones are kept [SI].
 

@@ -154,8 +154,6 @@ class MotionSearch:
         ----------
         form : GreyBoxModel
             One of `estimation.models.motion.MOTION_FORMS`.
-        log : GreyBoxLog
-            The log.
         starts : sequence of dict
             First guesses of the unknowns [SI].
         """

@@ -25,8 +25,6 @@ def with_stiffer_oil(diagnosed: DiagnoseAround, parameters: EhaParameters) -> Lo
     ----------
     diagnosed : callable
         Gives a diagnosis around an actuator, and for a doubt of the force on its rod [N].
-    parameters : EhaParameters
-        The actuator.
 
     Returns
     -------

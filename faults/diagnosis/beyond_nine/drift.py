@@ -124,8 +124,6 @@ def averaged_probabilities(found: Sequence[Diagnosis], calibration: Calibration)
     found : sequence of Diagnosis
         Diagnoses; they count by their evidences, as far as a wrong model's error lets them (`_evidence_share`), if all
         compare the same part of the log, otherwise equally.
-    calibration : Calibration
-        Weights of the evidences.
 
     Returns
     -------

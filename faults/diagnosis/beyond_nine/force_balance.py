@@ -112,8 +112,6 @@ def force_balance(blocks: Blocks, p: EhaParameters) -> Loads | None:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     p : EhaParameters
         The actuator, as its rig file has it.
 
@@ -144,8 +142,6 @@ def sliding_balance(blocks: Blocks, p: EhaParameters) -> Balance | None:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     p : EhaParameters
         The actuator, as its rig file has it.
 

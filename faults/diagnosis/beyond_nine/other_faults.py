@@ -159,8 +159,6 @@ def circuits_with_faults(
         The log in blocks, without pressure.
     fits : ClassFits
         The circuits without a fault that were fitted to it.
-    actuator : Actuator
-        The healthy actuator.
     gained : float
         Log-likelihood that one must gain on these to be of use [dimensionless]: a search that will end `HOPELESS` below
         that ends early.

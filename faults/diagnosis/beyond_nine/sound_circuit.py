@@ -125,8 +125,6 @@ def largest_pressure(blocks: Blocks, fit: PointFit, actuator: Actuator) -> float
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     fit : PointFit
         The circuit.
     actuator : Actuator

@@ -172,10 +172,6 @@ def with_other_faults(diagnosis: Diagnosis, actuator: Actuator, calibration: Cal
     ----------
     diagnosis : Diagnosis
         Diagnosis by circuits without such a fault.
-    actuator : Actuator
-        The healthy actuator.
-    calibration : Calibration
-        Weights of the evidences.
 
     Returns
     -------
@@ -284,8 +280,6 @@ def summed_over_wear(
         The evidences of a sound pump.
     scores : ndarray, shape (1 + pumps, 9)
         How well each condition fits the log with a sound pump, then with worn ones: log-likelihoods [dimensionless].
-    calibration : Calibration
-        Weights of the evidences.
     likely : ndarray, shape (1 + pumps,), optional
         Log-likelihoods of these pumps [dimensionless]. By default, the worn ones have `DELIVERIES` and the prior of a
         pump: half a normal distribution of the logarithm of delivery over displacement, with deviation `PRIOR_SPREADS`.

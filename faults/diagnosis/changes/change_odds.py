@@ -38,16 +38,12 @@ def is_change_believed(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     parts : sequence of Blocks
         The log before the change, and after it.
     fits : sequence of ClassFits
         Circuits fitted to each.
     whole : ClassFits
         Circuits fitted to all.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -105,10 +101,6 @@ def odds_of_change(
         Circuits fitted to the log before the change, and after it.
     whole : ClassFits
         Circuits fitted to all.
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -21,16 +21,12 @@ def fault_throughout(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     parts : sequence of Blocks
         What is before the change, and after it.
     fits : sequence of ClassFits
         Sound circuits fitted to each.
     whole : ClassFits
         Sound circuits fitted to all.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -120,8 +120,6 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
     record : Record
         The log. If it is longer than `LONGEST`, the part about the last change that `watch_record` finds is used, or
         its beginning if there is none.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -267,8 +265,6 @@ def part_of(blocks: Blocks, begin: int, end: int) -> Blocks:
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
     begin, end : int
         First remaining block, and the one after the last.
     """

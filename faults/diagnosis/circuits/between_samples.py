@@ -123,12 +123,6 @@ def spread_with_pressure(
 
     Parameters
     ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
-    actuator : Actuator
-        The healthy actuator.
     scores : ndarray, shape (9,)
         How well each condition's region holds it: log-likelihoods [dimensionless].
     seen : ndarray, shape (7,)

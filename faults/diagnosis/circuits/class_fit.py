@@ -189,10 +189,6 @@ def fit_freely(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
     condition : str
         The nearest condition, about which the weak prior lies.
     start : ndarray of shape (7,), or PointFit, optional

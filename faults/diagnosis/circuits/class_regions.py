@@ -142,10 +142,6 @@ def fit_classes(
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
     runs : ndarray, shape (9, n, outputs), optional
         Outputs of the nine nominal circuits [m/s, Pa]; computed if not given.
     start : ndarray, shape (7,), optional
@@ -238,10 +234,6 @@ def credible_information(fit: PointFit, blocks: Blocks, *, stuck: bool = False) 
 
     Parameters
     ----------
-    fit : PointFit
-        The fit.
-    blocks : Blocks
-        Its log.
     stuck : bool
         Whether the piston sticks: there is then no information on friction, since the seals' stiffness moves it.
 

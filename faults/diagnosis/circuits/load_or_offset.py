@@ -49,8 +49,6 @@ def load_for_offset(
     ----------
     blocks : Blocks
         The log, without pressure.
-    actuator : Actuator
-        The healthy actuator.
     nearest : str
         The nearest condition.
     without : PointFit

@@ -173,8 +173,6 @@ def residual_power(left: Array, blocks: Blocks) -> Array:
     ----------
     left : ndarray, shape (n, outputs)
         As `residuals_of` returns it.
-    blocks : Blocks
-        The log.
 
     Returns
     -------

@@ -86,14 +86,8 @@ def reasons_against(blocks: Blocks, fits: ClassFits, region: float, actuator: Ac
 
     Parameters
     ----------
-    blocks : Blocks
-        The log in blocks.
-    fits : ClassFits
-        The circuits fitted to it.
     region : float
         Log-likelihood of the nearest condition's region, relative to its centre [dimensionless].
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -21,8 +21,6 @@ def region_scores(fit: PointFit, information: Array, actuator: Actuator) -> Arra
         The circuit.
     information : ndarray, shape (7, 7)
         Inverse covariance of its coordinates; directions without information do not count.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -46,8 +44,6 @@ def scores_in_forces(fit: PointFit, told: Array, actuator: Actuator) -> Array:
         The circuit.
     told : ndarray, shape (7, 7)
         Credible inverse covariance of its coordinates.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------
@@ -86,8 +82,6 @@ def separations_in_forces(fit: PointFit, spread: Array, actuator: Actuator) -> A
         The circuit.
     spread : ndarray, shape (7, 7)
         Covariance of its coordinates, with the effect of bends.
-    actuator : Actuator
-        The healthy actuator.
 
     Returns
     -------

@@ -100,10 +100,6 @@ def fits_from_other_friction(blocks: Blocks, actuator: Actuator, best: PointFit,
 
     Parameters
     ----------
-    blocks : Blocks
-        The log.
-    actuator : Actuator
-        The healthy actuator.
     best : PointFit
         The best circuit so far.
     condition : str
