@@ -8,6 +8,7 @@ the filter is cautious, and is no objection. The test takes a few Fourier transf
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -114,45 +115,71 @@ def whiteness(estimate: Estimate, record: Record) -> tuple[Whiteness, ...]:
     kept = [c for c in range(normal.shape[1]) if np.count_nonzero(present[:, c]) >= FEWEST]
     if not kept or not np.all(np.isfinite(normal)):
         return ()
-    length = len(normal) // SEGMENTS
-    push = bridged(record[estimate.model.drives[0]])[first:]
-    drive = np.mean(np.abs(_spectra(push - np.mean(push), length)) ** 2, axis=0)
-    band, concentration = _counted_frequencies(drive), float(np.max(drive) / max(np.sum(drive), np.finfo(float).tiny))
-    around = np.max([np.roll(np.pad(drive, 1), shift)[1:-1] for shift in (-1, 0, 1)], axis=0)
-    driven = (around >= 0.1 * np.max(drive)) & bool(np.max(drive) > 0.0)
-    beside = ~driven[:band]
-    beside[0] = False  # the mean is no beat
-    quantile = float(chdtri(2 * SEGMENTS, FALSE_ALARMS / (len(kept) * band)))
+    drive = _drive_spectrum(bridged(record[estimate.model.drives[0]])[first:], len(normal) // SEGMENTS)
+    resolution = 1.0 / (drive.length * record.sample_time)
+    quantile = float(chdtri(2 * SEGMENTS, FALSE_ALARMS / (len(kept) * drive.band)))
     found: list[Whiteness] = []
     for c in kept:
-        values, count = normal[:, c], int(np.count_nonzero(present[:, c]))
-        power = np.mean(np.abs(_spectra(values, length)) ** 2, axis=0)[:band] * (len(values) / count)
-        steps = _whole_steps(estimate, first, c, quantum(record[estimate.channels[c]]))
-        if steps is not None:
-            unrounded = np.mean(np.abs(_spectra(steps, length)) ** 2, axis=0)[:band] * (len(values) / count)
-            power = np.where(beside, np.minimum(power, unrounded), power)
-        power[0] *= 0.5  # the mean is real, with half the degrees of freedom; halved, it has the same threshold
+        values, count, channel = normal[:, c], int(np.count_nonzero(present[:, c])), record[estimate.channels[c]]
+        power = _counted_power(values, _whole_steps(estimate, first, c, quantum(channel)), count, drive)
         peak = int(np.argmax(power))
         lags = _autocorrelations(values)
-        pattern = _quantisation(record[estimate.channels[c]]) / float(
-            np.nanmedian(estimate.residual_variances[first:, c])
-        )
+        pattern = _quantisation(channel) / float(np.nanmedian(estimate.residual_variances[first:, c]))
         found.append(
             Whiteness(
                 channel=estimate.channels[c],
                 count=count,
-                excess=max(0.0, float(power[peak]) - concentration * pattern * length / 2.0),
+                excess=max(0.0, float(power[peak]) - drive.concentration * pattern * drive.length / 2.0),
                 threshold=quantile / (2 * SEGMENTS),
-                frequency=peak / (length * record.sample_time),
-                resolution=1.0 / (length * record.sample_time),
-                driven=bool(driven[peak]),
+                frequency=peak / (drive.length * record.sample_time),
+                resolution=resolution,
+                driven=bool(drive.driven[peak]),
                 ljung_box=_ljung_box(lags, count),
                 autocorrelation=float(lags[np.argmax(np.abs(lags))]),
                 crosses=max((_correlation(values, normal[:, o]) for o in kept if o != c), default=0.0, key=abs),
-                with_drive=_coherent_share(values, push - np.mean(push), length),
+                with_drive=_coherent_share(values, drive.centred, drive.length),
             )
         )
     return tuple(found)
+
+
+class _DriveSpectrum(NamedTuple):
+    """Spectrum of a drive over segments of a ``length`` [samples].
+
+    ``centred`` is the drive without its mean, ``band`` the number of frequencies that count, ``concentration`` the
+    share of the largest power in the whole, and ``driven`` where the drive has power.
+    """
+
+    centred: Array
+    length: int
+    band: int
+    concentration: float
+    driven: BoolArray
+
+
+def _drive_spectrum(drive: Array, length: int) -> _DriveSpectrum:
+    centred = drive - np.mean(drive)
+    power = np.mean(np.abs(_spectra(centred, length)) ** 2, axis=0)
+    concentration = float(np.max(power) / max(np.sum(power), np.finfo(float).tiny))
+    around = np.max([np.roll(np.pad(power, 1), shift)[1:-1] for shift in (-1, 0, 1)], axis=0)
+    driven = (around >= 0.1 * np.max(power)) & bool(np.max(power) > 0.0)
+    return _DriveSpectrum(centred, length, _counted_frequencies(power), concentration, driven)
+
+
+def _counted_power(values: Array, steps: Array | None, count: int, drive: _DriveSpectrum) -> Array:
+    """Return the power of innovations at the frequencies that count; beside the drive's, of whole ``steps`` if less."""
+
+    def power_of(signal: Array) -> Array:
+        power = np.mean(np.abs(_spectra(signal, drive.length)) ** 2, axis=0)[: drive.band]
+        return power * (len(values) / count)
+
+    power = power_of(values)
+    if steps is not None:
+        beside = ~drive.driven[: drive.band]
+        beside[0] = False  # the mean is no beat
+        power = np.where(beside, np.minimum(power, power_of(steps)), power)
+    power[0] *= 0.5  # the mean is real, with half the degrees of freedom; halved, it has the same threshold
+    return power
 
 
 def _normalised(estimate: Estimate, first: int) -> tuple[Array, BoolArray]:
