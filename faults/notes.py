@@ -121,7 +121,7 @@ class ClassCode(Code):
         "chamber_volume in the rig file has no room for the stroke: it must be at least {percent:.0f} % larger, and "
         "the circuits were fitted with that; measure chamber_volume and stroke"
     )
-    NO_PROBABILITIES = "no probabilities: {reason}"
+    NO_PROBABILITIES = "no class: {reason}"
     LOAD_ON_ROD = (
         "a constant load of {force_n:.0f} N ({low:.0f} to {high:.0f} N) holds the rod back, or differential_pressure_pa"
         " reads {pressure_pa:.3g|bar} bar too much: the force balance cannot separate the two"

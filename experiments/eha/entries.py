@@ -47,7 +47,7 @@ COST_CODES = frozenset(
 )
 """Codes for the cost of an absent channel or an uncertain rig; the same for all logs, so reported once."""
 
-NO_CLASS_CODES = frozenset({"channel_zero", "models_alike", "models_diverged"})
+NO_CLASS_CODES = frozenset({"channel_zero", "models_alike", "models_diverged", "no_probabilities"})
 """Codes for why a log is in no class; they are reported in its message and not repeated beside it."""
 
 

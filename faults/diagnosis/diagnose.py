@@ -38,7 +38,7 @@ from faults.diagnosis.corrected_case import CorrectedCase, corrected_case
 from faults.diagnosis.doubtful_entries import doubtful_entries
 from faults.diagnosis.failed_search import doubts_after_fit
 from faults.diagnosis.known_losses import with_balance_severities
-from faults.diagnosis.models_verdict import models_verdict, ranked_conditions
+from faults.diagnosis.models_verdict import models_verdict, ranked_conditions, without_condition
 from faults.diagnosis.not_told import standstill_notes, without_undetermined
 from faults.diagnosis.rmse import Scores, score_mathematical
 from faults.diagnosis.severity import healthy_severities, limits_of, with_bulk_modulus
@@ -91,8 +91,8 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     Returns
     -------
     Finding
-        Its evidence is an `EhaEvidence`. If the log distinguishes the conditions but no circuit fits around the rig,
-        there is a condition without probabilities.
+        Its evidence is an `EhaEvidence`. If no circuit fits around the rig, there is a condition without probabilities.
+        If the log is too short for a circuit, there is no condition.
 
     Raises
     ------
@@ -111,11 +111,10 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     scores = plain.scores_of(log, case.with_whole_oil)
     verdict = models_verdict(scores, log.record)
     absent = () if PRESSURE in scores.channels else (ClassCode.PRESSURE_ABSENT_CLASS.note(),)
-    unsure = (*doubtful_entries(plain.parameters), *estimate.rig_notes)
     strange = case.strange
     if verdict.outcome is Outcome.NOT_OBSERVABLE:  # the log does not determine what a worn pump would change
         strange = tuple(note for note in strange if note.code is not RigCode.WEAR_NOT_EXCLUDED)
-    notes = (*log.left_out, *strange, *verdict.notes, *absent, *unsure)
+    notes = (*log.left_out, *strange, *verdict.notes, *absent, *doubtful_entries(plain.parameters), *estimate.rig_notes)
     found = replace(found, outcome=verdict.outcome, notes=notes, channels=scores.channels)
     if mistakes := log.mistakes or tuple(one for one in estimate.gate.reasons if isinstance(one.code, ChannelCode)):
         return replace(_without_class(found, log, scores, mistakes), outcome=Outcome.MISMATCH)
@@ -124,10 +123,11 @@ def diagnose_log(record: Record, rig: Rig, seen: tuple[CleanLog, BulkModulusEsti
     try:
         judged = partial(_diagnose_with_delivery, parameters=rig.parameters, case=case, plain=plain)
         diagnosis, around, named = averaged_over_drift(judged, log, case.strange)
-    except (RigError, LogError) as error:
+    except LogError as error:
+        return without_condition(replace(found, evidence=EhaEvidence(estimate, scores, None)), error)
+    except RigError as error:
         without = _without_class(found, log, scores, distinct((*case.doubts, *verdict.against)))
-        said = ClassCode.NO_CIRCUIT if isinstance(error, RigError) else ClassCode.NO_PROBABILITIES
-        return replace(without, notes=(*found.notes, said.note(reason=error.message)))
+        return replace(without, notes=(*found.notes, ClassCode.NO_CIRCUIT.note(reason=error.message)))
     if (sound := without_wrong_velocity(cleaned, diagnosis.against, estimate, case.strange)) is not None:
         return again((sound, estimate))
     diagnosis = with_balance_severities(_with_rig_oil(diagnosis, case.healthy), estimate, log.record, case.healthy)

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from estimation.finding import Outcome
+from estimation.finding import Finding, Outcome
 from estimation.log_checks.channel_names import POSITION, VELOCITY
+from estimation.notes import RigCode
 from faults.diagnosis.rmse import Scores, measured_velocity
 from faults.notes import AgainstCode, ClassCode
+from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
 
@@ -97,6 +100,26 @@ def models_verdict(scores: Scores, record: Record) -> ModelsVerdict:
     if ratio < LEAST_MARGIN:
         return ModelsVerdict(Outcome.NOT_OBSERVABLE, (ClassCode.MODELS_ALIKE.note(),), ())
     return ModelsVerdict(Outcome.OK, (), (AgainstCode.NONE_FITS.note(percent=100.0 * unexplained),) if poor else ())
+
+
+def without_condition(found: Finding, error: LogError) -> Finding:
+    """Return the finding on a log that is too short for a circuit: nominal models alone often name a wrong condition.
+
+    Parameters
+    ----------
+    found : Finding
+        What is known of the log without a circuit.
+    error : LogError
+        Why no circuit can be fitted.
+
+    Returns
+    -------
+    Finding
+        Not observable, with the reason. The note on pump wear is left out: there is no class that wear could change.
+    """
+    kept = (note for note in found.notes if note.code is not RigCode.WEAR_NOT_EXCLUDED)
+    notes = (*kept, ClassCode.NO_PROBABILITIES.note(reason=error.message))
+    return replace(found, outcome=Outcome.NOT_OBSERVABLE, notes=notes)
 
 
 def _zero_channels(channels: Sequence[str], record: Record) -> str:

@@ -272,7 +272,8 @@ def _conversion(unit: str, channel: str, name: str, source: str, logged: str | N
     try:
         return conversion_of(unit, UNITS[channel], logged)
     except ValueError as error:
-        raise LogError(f"column {name[:80]!r} cannot become {channel}: {error}", source) from error
+        option = f"--columns '{channel}={name[:80]}:UNIT' names its unit"
+        raise LogError(f"column {name[:80]!r} cannot become {channel}: {error}; {option}", source) from error
 
 
 def _known_channel(channel: str, error: Callable[[str], HydrostateError]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from plant.errors import NoChannelError
 from plant.log.chamber_pressures import CHAMBERS, PRESSURE, has_pressure_difference
 from plant.log.columns import CHANNELS, TIME, UNITS, list_in_words, unit_ending
-from plant.log.headings import Heading
+from plant.log.headings import Heading, is_misspelt
 from plant.log.notes import LogCode
 from plant.notes import Note
 from plant.units import LOWER_CASE, converts
@@ -144,6 +144,8 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     else:
         words = own.split("_")
         said = 4.0 * sum(word in name.split("_") for word in words) / len(words)
+    if said == 0.0 and is_misspelt(name, own):
+        said = 4.0
     if OTHER_QUANTITIES.search(name) and name != own:
         said += NOT_IT
     return said + (UNIT_FITS if fits else 0.0)
@@ -340,7 +342,8 @@ def in_usual_order(channels: Iterable[str]) -> list[str]:
 def _certain_guesses(headings: Sequence[Heading], channels: Sequence[str]) -> Iterator[tuple[Guess, str]]:
     """Yield the guesses that are certain enough to show, each with the option that uses it."""
     for one in guess_by_name(headings, [name for name in channels if name in UNITS]):
-        if one.sure >= SHOWN_PROBABILITY and one.spec.isprintable():
+        by_unit_alone = one.channel in CHAMBERS and one.points <= UNIT_FITS  # any pressure could be meant
+        if one.sure >= SHOWN_PROBABILITY and one.spec.isprintable() and not by_unit_alone:
             told = one.unit is not None or one.channel == TIME or one.name == one.channel
             unit = "" if told else ":UNIT"
             yield one, f"{one.channel}={one.spec[:60]}{unit}"

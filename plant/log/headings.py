@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
 from functools import cached_property
 
 from plant.unit_text import plain_unit
@@ -52,6 +53,28 @@ class Heading:
         """The bare name in lower case, its words joined by underscores."""
         parted = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", self.bare)
         return re.sub(r"[\W_]+", "_", parted.lower()).strip("_")
+
+
+LEAST_ALIKE, SHORTEST_WORD = 0.8, 4
+"""Least share of common letters, and fewest letters, of a word that counts as misspelt [fraction], [count]; judged."""
+
+
+def is_misspelt(stem: str, meant: str) -> bool:
+    """Return whether a name is another one with a letter wrong, missing or too many in some of its words.
+
+    Examples
+    --------
+    >>> is_misspelt("differential_presure", "differential_pressure"), is_misspelt("pressure_c", "pressure_a")
+    (True, False)
+    """
+    words, wanted = stem.split("_"), meant.split("_")
+    if len(words) != len(wanted) or stem == meant:
+        return False
+    return all(
+        one == other
+        or (min(len(one), len(other)) >= SHORTEST_WORD and SequenceMatcher(None, one, other).ratio() >= LEAST_ALIKE)
+        for one, other in zip(words, wanted, strict=True)
+    )
 
 
 def _split_unit(name: str) -> tuple[str, str | None]:

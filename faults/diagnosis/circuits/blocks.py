@@ -195,7 +195,10 @@ def blocks_of(record: Record) -> Blocks:
     count = (len(record) // pooled - 1) // block
     if count * block * sample_time < 2.0 * SETTLING or count < FEWEST:
         least = max(2.0 * SETTLING, FEWEST * block * sample_time)
-        raise LogError(f"a diagnosis needs a log of {least:.3g} s or more, got {record.duration:g} s")
+        raise LogError(
+            f"the log lasts {record.duration:.3g} s, but a diagnosis needs {least:.3g} s or more; log 10 s of steps "
+            "at several speeds"
+        )
     slow, rows = bridged_slow_channel(record[PRESSURE]) if PRESSURE in record else (None, 1)
     given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
     whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}

@@ -152,11 +152,13 @@ def test_without_a_circuit_a_frozen_sensor_also_makes_the_condition_unknown() ->
     assert entries["advice"] == [str(AdviceCode.CHECK_SENSOR.note(channels="position_m"))]
 
 
-def test_a_log_too_short_for_a_circuit_has_scores_but_no_probabilities() -> None:
-    entries = diagnosis_entries(diagnose_log(log("major_leakage").slice(600, 650), Rig()))
+def test_a_log_too_short_for_a_circuit_has_scores_but_no_class_and_says_how_long_it_must_be() -> None:
+    entries = diagnosis_entries(diagnose_log(log("major_leakage").slice(0, 190), Rig()))
     assert list(entries["scores"]) == list(CONDITIONS)
+    assert (entries["condition"], entries["unknown"], entries["outcome"]) == (None, None, "not_observable")
+    assert entries["message"].startswith("no class: the log lasts 0.189 s, but a diagnosis needs 0.2 s or more")
     assert "probabilities" not in entries
-    assert {ClassCode.NO_PROBABILITIES, ClassCode.MODELS_ALIKE} & set(codes(entries))
+    assert entries["message"] not in entries["warnings"]
 
 
 def test_outliers_left_out_of_a_log_are_a_warning_of_its_diagnosis() -> None:

@@ -14,6 +14,7 @@ from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import by_circuits, corrected_case, diagnose, known_losses
 from faults.diagnosis.diagnose import diagnose_log
+from faults.diagnosis.models_verdict import ranked_conditions
 from faults.notes import AdviceCode, AgainstCode, ClassCode
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
@@ -110,12 +111,15 @@ def test_an_objection_of_nominal_models_counts_only_beside_another_objection(mon
     assert poor in diagnose_log(log(), RIG).against
 
 
-def test_a_log_too_short_for_a_circuit_has_a_condition_without_probabilities() -> None:
-    short = log("major_leakage").slice(0, 90)
-    found = diagnose_log(short, RIG)
-    assert found.condition is not None
-    assert not found.probabilities
+def test_a_log_too_short_for_a_circuit_is_in_no_class_since_nominal_models_often_name_a_wrong_one() -> None:
+    p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(7)
+    run = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
+    found = diagnose_log(run.slice(0, 190), RIG)
+    assert ranked_conditions(found.evidence.scores)[0][0] == "major_leakage"
+    assert (found.outcome, found.condition, found.probabilities) == (Outcome.NOT_OBSERVABLE, None, {})
     assert ClassCode.NO_PROBABILITIES in codes(found)
+    assert RigCode.WEAR_NOT_EXCLUDED not in codes(found)
+    assert found.quantities["bulk_modulus"].value is not None
 
 
 def test_a_rig_file_without_a_valid_circuit_gives_a_condition_without_probabilities(

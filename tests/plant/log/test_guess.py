@@ -79,6 +79,9 @@ def notes_of(tmp_path: Path, header: str) -> list[Note]:
         ("dp", "differential_pressure_pa=dp:UNIT"),
         ("Druck [bar]", "differential_pressure_pa=Druck [bar]:bar"),
         ("p_A [bar]", "pressure_a_pa=p_A [bar]:bar"),
+        ("differential_presure_pa", "differential_pressure_pa=differential_presure_pa:Pa"),
+        ("diferential pressure [bar]", "differential_pressure_pa=diferential pressure [bar]:bar"),
+        ("velocty", "velocity_m_s=velocty:UNIT"),
         ("piston velocity [mm/s]", "velocity_m_s=piston velocity [mm/s]:mm/s"),
     ],
 )
@@ -88,7 +91,7 @@ def test_a_note_names_an_unread_column_that_may_be_a_channel(tmp_path: Path, nam
     assert told == LogCode.COLUMN_OVERLOOKED.note(column=name, channel=channel, option=option)
 
 
-@pytest.mark.parametrize("name", ["differential_pressure_pa", "dp_set", "temperature [degC]", "y"])
+@pytest.mark.parametrize("name", ["differential_pressure_pa", "dp_set", "temperature [degC]", "y", "gauge 4 [bar]"])
 def test_columns_that_cannot_be_a_missing_channel_are_ignored_without_a_note(tmp_path: Path, name: str) -> None:
     assert LogCode.COLUMN_OVERLOOKED not in [
         one.code for one in notes_of(tmp_path, f"time_s,motor_speed_rad_s,position_m,{name}")
