@@ -252,7 +252,9 @@ class RigCode(Code):
     MAKEUP_BENDS = (
         "make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much per bar (in the fit)"
     )
-    PARTLY_EXPLAINED = "a hint, no conclusion: {cause!w} explains all but {left:.2g} % of what the balance leaves"
+    PARTLY_EXPLAINED = (
+        "a hint, not a conclusion: {causes} would explain {explained:.0f} % of what the flow balance does not"
+    )
     GAS_CONTRADICTED = (
         "the accumulator holds at {limit} {ratio:.2g} times the gas that the rig file states, or its charge differs"
     )

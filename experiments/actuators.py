@@ -26,7 +26,7 @@ ENTRY_POINTS = "hydrostate.actuators"
 """Group of entry points with which an installed package registers its own kinds: ``name = "module:OBJECT"``."""
 
 
-def actuator(name: str) -> "ActuatorKind":
+def actuator(name: str, what: str = "--plant") -> "ActuatorKind":
     """Return the kind of actuator with this name.
 
     Parameters
@@ -34,6 +34,8 @@ def actuator(name: str) -> "ActuatorKind":
     name : str
         A name from `ACTUATORS` or from an installed package; or the name of one of a kind's models, such as
         ``circuit``.
+    what : str
+        What an error calls the name.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def actuator(name: str) -> "ActuatorKind":
         if name == kind.name or name in kind.models:
             return kind
     known = [one for kind in actuators() for one in (kind.name, *kind.models)]
-    raise HydrostateError(f"--plant must be one of {', '.join(known)}, got {name!r}")
+    raise HydrostateError(f"{what} must be one of {', '.join(known)}, got {name!r}")
 
 
 def kind_of_rig(rig: "Rig[Any]", usual: str) -> "ActuatorKind":
@@ -159,7 +161,7 @@ def read_own_rig(path: "Path", common: "ActuatorKind") -> "Rig[Any]":
     from plant.eha.rig import plant_of
 
     named = plant_of(path)
-    return (common if named is None else actuator(named)).read_rig(path)
+    return (common if named is None else actuator(named, f"{path}: plant")).read_rig(path)
 
 
 def verb_of_kind(kind: "ActuatorKind", verb: str) -> Any:

@@ -42,7 +42,8 @@ def small_file(path: Path, most: int = LARGEST) -> bytes:
     """
     about = path.stat()
     if not stat.S_ISREG(about.st_mode):
-        raise OSError(errno.EINVAL, "a regular file is needed")
+        folder = stat.S_ISDIR(about.st_mode)
+        raise OSError(errno.EINVAL, "it is a folder" if folder else "a regular file is needed")
     if about.st_size > most:
         raise OSError(errno.EFBIG, f"it has more than {most / 2**20:g} MB")
     return path.read_bytes()

@@ -130,7 +130,7 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     ),
     "a command stays as it is typed": (
         lambda log, file: hs.read(file, columns={"position_m": "X"}),
-        "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for rig='rig.toml'",
+        "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit; then add rig='",
     ),
     "misspelt option": (lambda log, file: log.estimate(methd="ekf"), "did you mean 'method'"),
     "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),

@@ -208,7 +208,7 @@ class ProcessModel:
         missing = [drive for drive in self.drives if drive not in record]
         if missing:
             wanted = ", ".join(self.drives)
-            raise LogError(f"the {self.name} form needs {wanted}, the record lacks {', '.join(missing)}")
+            raise LogError(f"the {self.name} form needs {wanted}; the log has no {' and no '.join(missing)}")
 
     def index(self, name: str) -> int:
         """Return the position of a state.

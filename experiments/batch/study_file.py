@@ -227,6 +227,9 @@ def read_study(path: str | Path) -> Study:
     path = study_path(path)
     try:
         content = small_toml(path)
+    except FileNotFoundError as error:
+        shipped = " and ".join(shipped_studies())
+        raise StudyError(f"{path}: there is no such study file; {shipped} are included, and need no file") from error
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from error
     except ValueError as error:

@@ -261,7 +261,9 @@ def load_actuator(plant: str | None, path: Path | None) -> "tuple[ActuatorKind, 
         from plant.eha.rig import plant_of
 
         plant = plant_of(path)
-    kind = actuator(plant or DEFAULT)
+        kind = actuator(plant or DEFAULT, f"{path}: plant")
+    else:
+        kind = actuator(plant or DEFAULT)
     return kind, kind.read_rig(path)
 
 

@@ -22,6 +22,7 @@ from experiments.command.options import (
     split_names,
 )
 from experiments.command.output_paths import require_place
+from experiments.command.terminal import note
 from experiments.running.refusal import os_errors_as
 from experiments.streams.broker import broker_publisher
 from experiments.streams.endings import report_end, say_line, stop_at_signals
@@ -29,6 +30,12 @@ from experiments.streams.filtering import Filtering
 from experiments.streams.rows import STANDARD_INPUT, stream_input, warn_of_lost_batches
 from plant.errors import LogError
 from plant.log.stream.source import BatchCounts, bounded_lines, is_stream, stream_lines
+
+HEALTHY_ASSUMED = (
+    "leakage and friction are taken from the rig {rig!r}; if the actuator leaks more, bulk modulus is wrong: where "
+    "position and pressure are logged, --form flow estimates leakage too"
+)
+"""What is said of a filter that is given leakage and friction."""
 
 commands = typer.Typer()
 
@@ -53,7 +60,12 @@ def filter_stream(
     ] = "pressure",
     method: Annotated[str, option("METHOD", "ekf, iekf, ukf, ckf, svsf or sif.")] = "ekf",
     states: Annotated[
-        str, option("NAMES", "Parameters to estimate in addition to bulk modulus, comma-separated.")
+        str,
+        option(
+            "NAMES",
+            "Parameters to estimate in addition to bulk modulus, comma-separated: leakage, friction, air, or names "
+            "such as flow_bias.",
+        ),
     ] = "",
     like: Annotated[
         Path | None,
@@ -91,11 +103,16 @@ def filter_stream(
             sink(shown)
 
     stop_at_signals()
+    from estimation.eha.by_filter import GROUPS
     from estimation.eha.online import StreamFilterOptions
+    from estimation.models.eha_forms import FORMS
 
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
-        asked = StreamFilterOptions(bench.parameters, form, method, split_names(states), tune)
+        freed = tuple(one for name in split_names(states) for one in GROUPS.get(name, (name,)))
+        asked = StreamFilterOptions(bench.parameters, form, method, freed, tune)
+        if form in FORMS and not freed:
+            note(HEALTHY_ASSUMED.format(rig=bench.name))
         log = None if like is None else read_and_warn(str(like), lambda: read_log(like, bench.columns, named))
         source = STANDARD_INPUT if stream == "-" else stream
         told = Filtering(say, asked, (bench.columns, named), every, log, state, source)

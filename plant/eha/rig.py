@@ -172,7 +172,8 @@ def _read_content(path: Path) -> dict[str, Any]:
     try:
         return small_toml(path)
     except OSError as error:
-        raise RigError(f"{path}: cannot be read as a rig file: {error.strerror or error}") from error
+        hint = "; `hydrostate rig init` writes one to fill in" if isinstance(error, FileNotFoundError) else ""
+        raise RigError(f"{path}: cannot be read as a rig file: {error.strerror or error}{hint}") from error
     except ValueError as error:
         raise RigError(f"{path}: a rig file (TOML) is needed: {error}") from error
 
@@ -340,8 +341,7 @@ def write_rig_template(path: str | Path, template: str | None = None) -> None:
     RigError
         If the file exists or cannot be written.
     """
-    path = Path(path)
-    if path.exists() or path.is_symlink():
+    if (path := Path(path)).exists() or path.is_symlink():
         raise RigError(f"{path}: the file exists already and is not overwritten; give another name")
     try:
         with replacing(path) as file:

@@ -288,7 +288,7 @@ def _useful_channels(found: Collection[str]) -> list[str]:
 
 
 INSPECT_ADVICE = (
-    "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit, for --rig rig.toml"
+    "`hydrostate inspect FILE --write rig.toml` guesses which column is which and in what unit; then add --rig rig.toml"
 )
 """The command that shows more; it leaves this out where it speaks itself."""
 

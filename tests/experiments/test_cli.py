@@ -154,7 +154,7 @@ def test_fitting_a_log_imports_no_filters(tmp_path: Path) -> None:
         (["estimate", "a.csv", "--start-std", "0"], "--start-std must be positive and finite, got 0 Pa"),
         (
             ["estimate", "a.csv", "--rig", "none.toml"],
-            "none.toml: cannot be read as a rig file: No such file or directory",
+            "none.toml: cannot be read as a rig file: No such file or directory; `hydrostate rig init`",
         ),
         (["estimate", "a.csv", "--columns", "position_m"], "columns must be given as CHANNEL=NAME:UNIT"),
         (
@@ -205,7 +205,7 @@ def test_fitting_a_log_imports_no_filters(tmp_path: Path) -> None:
             ["diagnose", "a.csv", "--report", "a.pdf"],
             "--report must end in .html, got 'a.pdf'; a browser prints the page",
         ),
-        (["diagnose", "a.csv", "--rig", "."], ".: cannot be read as a rig file: a regular file is needed"),
+        (["diagnose", "a.csv", "--rig", "."], ".: cannot be read as a rig file: it is a folder"),
         (["--rig", "a.toml", "diagnose"], "No such option: --rig (a command's options stand after its name)"),
         (["simulate", "-o", "a.csv", "--duration", "10s"], "'--duration': a number is needed, got '10s'"),
         (["simulate", "-o", "a.csv", "--seed", "x"], "'--seed': a whole number is needed, got 'x'"),

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from estimation.fits.cause_words import causes_in_words
 from estimation.fits.flow.accumulator import is_far_stiffer
 from estimation.fits.flow.agreement import wanted_gain
 from estimation.fits.flow.log import homed_at_stop
@@ -140,7 +141,8 @@ def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]
     before, left = (max(fit.chi_square[0] - 1.0, 0.0) for fit in (plain.best, strange.fit))
     if plain.explains(plain.best) or left >= MOST_LEFT * before:
         return ()
-    return (RigCode.PARTLY_EXPLAINED.note(cause=strange.names[0], left=100.0 * left / before),)
+    share, said = 100.0 * left / before, causes_in_words(strange.names)
+    return (RigCode.PARTLY_EXPLAINED.note(cause=strange.names[0], causes=said, left=share, explained=100.0 - share),)
 
 
 def explanation_test(plain: PlainFits, *, begun: bool) -> Callable[[GreyBoxFit], bool]:

@@ -84,7 +84,7 @@ def require_flow_channels(record: Record) -> None:
     """
     lacking = [channel for channel in FLOW_CHANNELS if channel not in record]
     if lacking:
-        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}, the record lacks {', '.join(lacking)}")
+        raise LogError(f"the flow form needs {' and '.join(FLOW_CHANNELS)}; the log has no {' and no '.join(lacking)}")
 
 
 def without_strays(record: Record) -> tuple[Record, Mapping[str, float]]:

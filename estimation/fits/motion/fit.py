@@ -134,7 +134,7 @@ def fit_motion(
         If position is missing.
     """
     if "position_m" not in record:
-        raise LogError("the motion form needs position_m, the record lacks it")
+        raise LogError("the motion form needs position_m; the log has no position_m")
     noise = (variances or measurement_variances(record, ("motor_speed_rad_s",)))["motor_speed_rad_s"]
     log = motion_log(record, parameters, uncertainties or {}, noise)
     starts = _starts(parameters, max(bulk_modulus, 1e-2 * parameters.bulk_modulus))

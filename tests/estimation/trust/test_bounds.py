@@ -140,7 +140,7 @@ def test_a_channel_of_infinite_variance_gives_the_bound_without_it() -> None:
 def test_a_bound_without_drive_or_with_a_noiseless_sensor_is_refused() -> None:
     p, still = EhaParameters(), Record(1e-3, {"position_m": np.zeros(5)})
     prior = first_belief(PRESSURE_FORM, still, p.bulk_modulus, 3e8)
-    with pytest.raises(LogError, match="pressure form needs motor_speed_rad_s, the record lacks motor_speed_rad_s"):
+    with pytest.raises(LogError, match="pressure form needs motor_speed_rad_s; the log has no motor_speed_rad_s"):
         posterior_bound(PRESSURE_FORM, prior, still, p, variances={"position_m": 1e-12})
     with pytest.raises(HydrostateError, match=r"the variance of position_m must be positive, got 0\.0"):
         posterior_bound(PRESSURE_FORM, prior, driven("steps", p, 1.0), p, variances={"position_m": 0.0})

@@ -53,7 +53,7 @@ def test_every_study_file_of_the_package_can_be_read() -> None:
 
 def test_a_missing_or_invalid_toml_file_is_refused_by_its_path(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("name = ", encoding="utf-8")
-    for name, said in (("a.toml", "a TOML file is needed"), ("b.toml", "cannot be read: No such file")):
+    for name, said in (("a.toml", "a TOML file is needed"), ("b.toml", "there is no such study file; eha-paper")):
         with pytest.raises(StudyError, match=said) as caught:
             read_study(tmp_path / name)
         assert str(tmp_path / name) in str(caught.value)

@@ -130,7 +130,7 @@ def test_a_long_study_without_a_terminal_prints_its_progress_at_intervals(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("batch", "nothing.toml"), "nothing.toml: cannot be read: No such file"),
+        (("batch", "nothing.toml"), "nothing.toml: there is no such study file; eha-paper and"),
         (("report", "nowhere"), "store nowhere: there is no batch study there"),
         (("compare", "nowhere", "nothing"), "store nowhere: there is no batch study there"),
         (("compare", __file__, "b.csv"), "b.csv: there is no such file"),

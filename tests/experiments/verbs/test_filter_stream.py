@@ -38,12 +38,19 @@ def run(*arguments: object, given: str | None = None) -> tuple[int, list[dict[st
 
 def test_a_filtered_stream_gives_bulk_modulus_with_its_standard_deviation(log: Path) -> None:
     code, told, said = run("-", given=log.read_text())
+    assert "leakage and friction are taken from the rig 'paper'" in said
     assert (code, "warning" in said) == (0, False)  # not `said == ""`: the first run may announce that it compiles
     assert [one["event"] for one in told] == ["start", *["estimate"] * 4, "end"]
     last = told[-2]
     assert last["values"]["bulk_modulus_pa"] == pytest.approx(P.bulk_modulus, rel=0.01)
     assert 0.0 < last["std"]["bulk_modulus_pa"] < 0.01 * P.bulk_modulus
     assert (last["gate"], last["samples"], told[-1]["outcome"]) == ([], 4000, "ok")
+
+
+def test_a_filter_estimates_groups_of_parameters_by_their_short_names(log: Path) -> None:
+    _, told, said = run(log, "--states", "leakage,friction")
+    assert {"leakage_coefficient", "flow_bias", "friction_linear", "friction_coulomb"} <= told[-2]["values"].keys()
+    assert "taken from the rig" not in said
 
 
 def test_a_restart_between_two_rows_does_not_change_the_result(log: Path, tmp_path: Path) -> None:

@@ -159,9 +159,9 @@ def test_an_invalid_rig_file_is_refused_with_file_and_field(tmp_path: Path, text
 
 
 def test_a_missing_or_binary_rig_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RigError, match="cannot be read as a rig file: No such file"):
+    with pytest.raises(RigError, match="No such file or directory; `hydrostate rig init` writes one to fill in"):
         read_rig(tmp_path / "rig.toml")
-    with pytest.raises(RigError, match="cannot be read as a rig file: a regular file is needed"):
+    with pytest.raises(RigError, match="cannot be read as a rig file: it is a folder"):
         read_rig(tmp_path)
     (tmp_path / "rig.toml").write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(RigError, match="TOML"):
