@@ -105,12 +105,12 @@ class EstimateCode(Code):
         "the true uncertainty is larger than the covariance"
     )
     BOUND_TOO_WIDE = (
-        "this log determines bulk modulus to no better than {percent:.0f} % (Cramér-Rao bound; 3 % is allowed): larger "
-        "steps, or 1 kHz where it was logged more slowly, may help"
+        "this log determines bulk modulus to {percent:.0f} % at best (Cramér-Rao bound; 3 % is allowed): log larger "
+        "steps, at 1 kHz or more"
     )
     KNOWN_AS_THE_RIG = (
-        "measure {entry}: its uncertainty in the rig file causes {percent:.0f} % of the variance of {quantity!w} with "
-        "rig error"
+        "measure {entry}, and list it under measured in the rig file: its uncertainty there causes {percent:.0f} % of "
+        "the variance of {quantity!w} with rig error"
     )
     STIFFER_THAN_RIG = (
         "bulk modulus is {ratio:.2g} times that in the rig file: if the oil is stiffer, enter its bulk_modulus there, "
@@ -128,8 +128,8 @@ class EstimateCode(Code):
         "pressure fits {ratio:.1f} times more closely than the noise of position_m allows: the fit is not believed"
     )
     PRESSURE_RESIDUALS_CORRELATED = (
-        "the flow balance leaves something out: successive pressure residuals have a correlation of {correlation:.2f} "
-        "(noise alone: 0)"
+        "the flow balance leaves something out: what it misses of the pressure is more than noise (correlation of "
+        "successive residuals {correlation:.2f}, noise alone: 0)"
     )
     SEARCH_ENDED = "the search for what explains the log became too long and was ended: use a shorter part of the log"
     CHANNEL_LATE = (
@@ -154,16 +154,16 @@ class EstimateCode(Code):
     )
     FRICTION_LAWS_DISAGREE = (
         "two friction models explain the log equally well, but put bulk modulus at {least_pa:.3g|MPa} and at "
-        "{most_pa:.3g|MPa} MPa"
+        "{most_pa:.3g|MPa} MPa; log differential pressure"
     )
     FORCES_ON_ANY_SCALE = (
         "position alone does not fix the scale of the forces: any bulk modulus from {least_pa:.3g|MPa} to "
         "{most_pa:.3g|MPa} MPa explains the log, with friction in proportion; log differential pressure"
     )
-    NOT_HELD = "position alone does not determine bulk modulus: with any value, the piston would move as logged"
+    NOT_HELD = "position alone does not determine bulk modulus: any value fits the motion; log differential pressure"
     WEAKLY_HELD = (
         "position alone determines bulk modulus only weakly: noise gives it a standard deviation of "
-        "{noise_percent:.2g} %, and a misfit too small to detect may move it by {percent:.0f} %"
+        "{noise_percent:.2g} %, and a misfit too small to detect may move it by {percent:.0f} %; log pressure"
     )
     INNOVATIONS_LARGE = (
         "the residuals of {channel} are {ratio:.1f} times as large as the filter expects (normalised innovation "
@@ -190,7 +190,7 @@ class EstimateCode(Code):
     PUMP_AND_PISTON_REST = (
         "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
     )
-    POSITION_CONSTANT = "{channel} never changes: a dead sensor and a piston that stands still look alike"
+    POSITION_CONSTANT = "{channel} never changes: the sensor is dead, or the piston stands still; find out which"
     PISTON_STANDS_STILL = (
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
         "stuck, or all that is pumped leaks or is compressed; no motion confirms the units of motor speed and pressure"
@@ -228,7 +228,7 @@ class RigCode(Code):
     PRESSURE_DRIFTS = (
         "pressure's offset drifts by {drift_pa:.4g|bar} ± {half_width_pa:.2g|bar} bar over the log; it was subtracted"
     )
-    PRESSURE_SIDES = "chamber gauges differ by {percent:z.2f} ± {half_width:.2g} % in gain; the fit includes this"
+    PRESSURE_SIDES = "the chamber gauges differ in gain by {percent:z.2f} ± {half_width:.2g} %; the fit includes this"
     ENCODER_ZERO = (
         "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke; it was shifted to zero there. If its "
         "zero is right, chamber {side} holds {more:.2g|L} L more than the other (a hose)"
@@ -250,13 +250,11 @@ class RigCode(Code):
     )
     PUMP_RIPPLES = "the pump's {teeth} teeth make its flow ripple by {percent:.1f} ± {half_width:.2g} % (in the fit)"
     MAKEUP_BENDS = (
-        "make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much per bar (in the fit)"
+        "make-up valves act as orifices: at {drop_pa:.2g|bar} bar they pass half as much per bar; the fit includes this"
     )
-    PARTLY_EXPLAINED = (
-        "a hint, not a conclusion: {causes} would explain {explained:.0f} % of what the flow balance does not"
-    )
+    PARTLY_EXPLAINED = "a hint only: {causes} would explain {explained:.0f} % of what the flow balance does not"
     GAS_CONTRADICTED = (
-        "the accumulator holds at {limit} {ratio:.2g} times the gas that the rig file states, or its charge differs"
+        "the accumulator holds at {limit} {ratio:.2g} times the gas in the rig file, or its charge pressure is another"
     )
     MAKEUP_UNSEEN = "the make-up valve of chamber {side} never opened: this log does not show whether it is stuck shut"
     SPEED_OFFSET = (
@@ -347,6 +345,6 @@ class RigCode(Code):
     )
     CHECKS_CRACK = (
         "the make-up valves open {crack_pa:.3g|bar} ± {half_width_pa:.2g|bar} bar below the rig file's accumulator "
-        "pressure (mean of both), that of chamber {side} {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
+        "pressure (mean of both); chamber {side}'s opens {later_pa:.3g|bar} ± {later_half_width_pa:.2g|bar} bar lower"
     )
-    EXPLAINED_OTHERWISE = "the log is explained about as well by {others!w}; the interval includes this"
+    EXPLAINED_OTHERWISE = "the log is explained about as well by {causes}; the interval includes this"

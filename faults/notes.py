@@ -46,16 +46,16 @@ class AgainstCode(Code):
         "file ({entry} of about {value:.2g} {unit}): without differential_pressure_pa the log does not tell which"
     )
     LOAD_VARIES = (
-        "a load on the rod that changes over the log explains its force balance: it varies by about {force_n:.2g} N "
-        "(root mean square), and the circuits have none"
+        "the load on the rod changes over the log: its force varies by about {force_n:.2g} N (root mean square), and "
+        "the nine conditions have no load"
     )
     FRICTION_VARIES = (
         "friction is intermittent: at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston "
-        "back, whichever way it slides, and the circuits have one friction"
+        "back, whichever way it slides; in each of the nine conditions friction stays the same"
     )
     GRIPS_ONE_WAY = (
-        "at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston back, which slides one way "
-        "then: friction is intermittent, or a load comes and goes, and the circuits have neither"
+        "at times, most at {at_s:.3g} s, {force_n:.2g} N more than usual hold the piston back, always while it slides "
+        "the same way: friction is intermittent, or a load comes and goes, and the nine conditions have neither"
     )
     PRESSURE_BIAS = "differential pressure reads wrong by {bias_pa:+.3g|bar} bar"
     OIL_SOFT = "the oil's bulk modulus is {share:.2f} times that in the rig file: air in the oil, or a soft hose"
@@ -87,7 +87,9 @@ class ClassCode(Code):
         "spread of this factor among actuators of one kind"
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
-    VELOCITY_LOST_TOLD = "of leakage, the log tells the velocity lost: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    VELOCITY_LOST_TOLD = (
+        "how much velocity leakage costs is known all the same: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+    )
     STUCK_NOT_TOLD = (
         "a make-up valve that is stuck shut but never had to open leaves no trace; this fault, which is not one of "
         "the nine conditions, keeps a probability of {percent:.0f} %"
@@ -97,8 +99,8 @@ class ClassCode(Code):
         "or a wrong rig file); the conditions were compared at that value"
     )
     NOT_EXCLUDED = (
-        "without differential_pressure_pa, other faults are not excluded: {faults} would explain the log about as "
-        "well; {condition}"
+        "without differential_pressure_pa, other faults explain the log about as well and are not excluded: {faults}; "
+        "{condition}"
     )
     VELOCITY_CONTRADICTED = (
         "{channel} and the slope of position_m differ by {difference_m_s:.2g|mm/s} mm/s; motor speed and pressure "
@@ -166,7 +168,7 @@ class AdviceCode(Code):
     INSPECT_PUMP = "inspect the teeth and the side plates of the pump"
     FREE_PISTON = "check whether rod or piston is blocked, then log again while the piston moves"
     HOLD_LOAD = "log again without the load on the rod, or with one that is constant"
-    FREE_ROD = "find what grips at times: a bent rod, a load from the side, dirt, or a torn seal"
+    FREE_ROD = "find what holds the piston back at times: a bent rod, a load from the side, dirt, or a torn seal"
     CHECK_INLET = "check the pump's inlet: accumulator pressure, suction line, strainer, oil temperature"
     CHECK_VALVES = "check the seats of relief and check valves, and the piston seal"
     CHECK_MAKEUP = "check the make-up valve of chamber {side}: poppet, seat and spring"

@@ -10,6 +10,7 @@ from estimation.eha.changing_leakage import growth_note, relative_leakage, step_
 from estimation.eha.entrained_air import air_note
 from estimation.eha.port_drains import drain_note
 from estimation.finding import NORMAL_95
+from estimation.fits.cause_words import causes_in_words
 from estimation.fits.greybox.play_courses import crossings
 from estimation.fits.greybox.pump_ripple import NO_RIPPLE, Turning, delivering_speed
 from estimation.fits.hypotheses import WORN_SHARE
@@ -62,7 +63,8 @@ def notes_of(found: Explanation, parameters: EhaParameters) -> tuple[Note, ...]:
     """
     notes = [_NOTES[name](found, parameters) for name in found.names]
     if found.rivals:
-        notes.append(RigCode.EXPLAINED_OTHERWISE.note(others=", ".join(found.rivals)))
+        causes = "; or by ".join(causes_in_words(one.split(" and ")) for one in found.rivals)
+        notes.append(RigCode.EXPLAINED_OTHERWISE.note(others=", ".join(found.rivals), causes=causes))
     return tuple(notes)
 
 

@@ -43,7 +43,7 @@ def causes_in_words(names: Sequence[str]) -> str:
 
     Examples
     --------
-    >>> causes_in_words(["delivery", "pressure_late"])
-    'a pump that delivers less than its displacement, and a pressure that was logged late'
+    >>> causes_in_words(["air", "pressure_late"])
+    'air in the oil and a pressure that was logged late'
     """
-    return ", and ".join(CAUSE_WORDS[name] for name in names)
+    return " and ".join(CAUSE_WORDS[name] for name in names)

@@ -13,7 +13,7 @@ class IdentificationCode(Code):
     )
     FEEDBACK = (
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
-        " where output error is biased; fit ARMAX or Box-Jenkins, or name the column that drives the loop (--reference)"
+        " where output error is biased; name the column that drives the loop (--reference), or fit ARMAX or Box-Jenkins"
     )
     SWAPPED = (
         "{input!r} seems to answer {output!r}, not the other way round (a model in that direction leaves {back:.0%} of "
@@ -39,8 +39,8 @@ class IdentificationCode(Code):
         "into ramps: judge a model by a log of its own sample time, or fit with --resample"
     )
     INPUT_SPLIT = (
-        "input {channel!r} lacks {count} of {total} samples that cannot be interpolated: the log was split into "
-        "{pieces} experiments, each with its own initial state"
+        "input {channel!r} lacks {count} of {total} samples that cannot be interpolated: the log was split "
+        "there (experiments: {pieces}, each with its own initial state)"
     )
     OUTPUT_ALONE_FILTERED = (
         "only the output is filtered: the poles come out 20 to 30 % off, and the gain does not roll off (errata E15); "
@@ -86,9 +86,9 @@ class IdentificationCode(Code):
         "errs by {linear:.0%}. Fit a log with inputs like these, or see the nonlinear run with --structure {structure}"
     )
     ERROR_MODELLED = (
-        "a polynomial of inputs and free run, now and up to {earlier:.3g} s earlier, predicts part of what the "
-        "{structure} model leaves of {output!r}: {left:.0%} of its error on held-back data is left. Simulations "
-        "include it; transfer function, poles and gain do not"
+        "part of the error of the {structure} model of {output!r} can be predicted by a polynomial of its free run and "
+        "the inputs, now and up to {earlier:.3g} s earlier: {left:.0%} of the error on held-back data is left. "
+        "Simulations include this polynomial; transfer function, poles and gain do not"
     )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "

@@ -57,7 +57,7 @@ class LogCode(Code):
         "{row}); the rows were read as one log"
     )
     END_LEFT_OUT = "the lines after row {taken}, the last row of data, were left out (lines: {count})"
-    COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}"
+    COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}; it was read without them"
     COLUMN_OVERLOOKED = (
         "column {column!r} was not used, but it may be {channel}; if it is, name it under [columns] in the rig file, "
         "or add --columns '{option}'"

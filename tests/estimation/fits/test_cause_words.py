@@ -14,6 +14,6 @@ def test_every_hypothesis_has_words_for_a_reader() -> None:
 def test_a_hint_is_a_sentence_without_names_of_the_code() -> None:
     note = RigCode.PARTLY_EXPLAINED.note(cause="delivery", causes=CAUSE_WORDS["delivery"], left=4.0, explained=96.0)
     assert str(note) == (
-        "a hint, not a conclusion: a pump that delivers less than its displacement would explain 96 % of what the flow "
-        "balance does not"
+        "a hint only: a pump that delivers less than its displacement would explain 96 % of what the flow balance does "
+        "not"
     )

@@ -203,7 +203,7 @@ def test_a_rig_of_another_size_with_the_papers_leakage_and_friction_is_noted(
 def test_a_rig_entry_that_limits_several_logs_is_named_once() -> None:
     found = [estimate_entries(estimate_log(log(condition), Rig())) for condition in ("normal", "major_leakage")]
     (said,) = costs(found)
-    assert said.startswith("2 of 2 logs: measure chamber_volume: ")
+    assert said.startswith("2 of 2 logs: measure chamber_volume, and list it under measured")
 
 
 def test_nominal_models_that_do_not_fit_a_log_make_its_condition_unknown() -> None:
