@@ -110,7 +110,7 @@ def sentences(card: Card) -> tuple[str, ...]:
             f"the piston sticks for {percent(card.stuck)} of the time; while it sticks, position and velocity say "
             "nothing about bulk modulus (errata E13)"
             + (
-                "; differential pressure does"
+                ", and only differential pressure does"
                 if PRESSURE in card.channels
                 else ": log differential pressure, or drive with larger, slower steps"
             )
@@ -148,11 +148,11 @@ def _inseparable_sentences(card: Card) -> list[str]:
 def _rig_sentences(card: Card) -> list[str]:
     if "bulk_modulus" not in card.unknowns:
         return []
-    rule = "only the ratio of chamber volume to bulk modulus matters"
+    rule = "a log determines only the ratio of chamber volume to bulk modulus"
     if not card.uncertainties:
         return [
             f"{rule}: an error of 1 % in the volume is an error of 1 % in bulk modulus; these bounds take the volume "
-            "as exact; list chamber_volume under [uncertainty] in the rig file, and they include its error"
+            "as exact unless chamber_volume is listed under [uncertainty] in the rig file"
         ]
     given = ", ".join(f"{_in_words(name)} {percent(std)}" for name, std in card.uncertainties.items())
     whole, alone = card.relative_std["bulk_modulus"], card.known_exactly["bulk_modulus"]

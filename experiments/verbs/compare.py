@@ -54,7 +54,10 @@ def compare(
     names = [Path(place.rstrip("/")).name for place in (first, second)]
     if names[0] == names[1]:
         names = ["A", "B"]
-    frames = [frame_of(open_store(place).rows()) for place in (first, second)]
+    try:
+        frames = [frame_of(open_store(place).rows()) for place in (first, second)]
+    except HydrostateError as error:
+        raise HydrostateError(f"{error}; compare takes two logs, or two stores of batch studies") from error
     found = compare_studies(*frames, seed=seed)
     if out is not None:
         write_whole(out, render_comparison(found, names), "--out", parents=True)

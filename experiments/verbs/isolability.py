@@ -97,7 +97,7 @@ def _verdict(distances: "Distances") -> str:
     alike = sum(wrong_verdicts(float(one)) > ERROR for one in apart)
     first, second = distances.hardest
     if not alike:
-        return f"all conditions can be told apart; the hardest pair is {first} and {second}"
+        return f"all conditions can be told apart; hardest are {first} and {second}, which need the longest log"
     return (
         f"{alike} of {len(apart)} pairs of conditions cannot be told apart with fewer than {100.0 * ERROR:g} % wrong "
         f"verdicts; the hardest pair is {first} and {second}"
