@@ -1,6 +1,7 @@
 """One log, written in 27 ways by the real libraries, gives one Record, read unaided or as `inspect` advises."""
 
 import json
+import shutil
 import warnings
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -79,6 +80,17 @@ def test_a_log_gives_the_same_record_in_every_format(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         assert_same(read_record(path, **options_of(READ[name], path)), log)
+
+
+@pytest.mark.parametrize("name", [name for name, way in READ.items() if "beside" not in way.options])
+def test_a_log_is_read_whatever_its_name_as_a_server_keeps_it(
+    name: str, log: pd.DataFrame, written: Callable[[str], Path], tmp_path: Path
+) -> None:
+    path = written(name)
+    kept = Path(shutil.copy(path, tmp_path / "0123456789abcdef"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        assert_same(read_record(kept, **options_of(READ[name], path)), log)
 
 
 @pytest.mark.parametrize("name", ALSO_READ)
