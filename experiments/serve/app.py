@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, Path, Query, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import StreamingResponse
@@ -31,7 +31,7 @@ from experiments.serve.limits import (
     require_size,
 )
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
-from experiments.serve.pages import home_page, live_page, policy_of, policy_of_file
+from experiments.serve.pages import home_page, live_page, page_on_disk, policy_of
 from experiments.serve.refusals import POLICY, refusal_page, wants_page
 from experiments.serve.service import Service
 from experiments.serve.settings import Settings
@@ -58,7 +58,13 @@ WHY: Mapping[int, str] = {
     429: "The server is busy; come again after the seconds of Retry-After.",
 }
 
-_CONTROLS = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069]")
+_UNSEEN = re.compile(
+    r"[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff"
+    r"\ufff9-\ufffb\U000e0000-\U000e007f]"
+)
+"""Characters that cannot be seen, or that turn the direction of a text; scripts need \\u200c and \\u200d."""
+
+_BLANK = " .\u200c\u200d"
 
 
 def refusal_responses(*more: int, page: bool = False) -> dict[int | str, dict[str, Any]]:
@@ -130,11 +136,11 @@ def plain_name(name: str) -> str:
 
     Examples
     --------
-    >>> plain_name("C:/logs/../run 1.csv"), plain_name("..")
-    ('run 1.csv', 'log')
+    >>> plain_name("C:/logs/../run 1.csv"), plain_name(".."), plain_name(chr(0x200B))
+    ('run 1.csv', 'log', 'log')
     """
-    known = _CONTROLS.sub("", re.split(r"[/\\]", name)[-1]).strip()
-    return known if known.strip(".") else "log"
+    known = _UNSEEN.sub("", re.split(r"[/\\]", name)[-1]).strip()
+    return known if known.strip(_BLANK) else "log"
 
 
 def methods_at(app: FastAPI, scope: Scope) -> list[str]:
@@ -213,7 +219,7 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
         """Return the result of a log: the object that `hydrostate VERB --json` prints for it."""
         return service.result(id)
 
-    @app.delete("/api/logs/{id}", status_code=204, responses=refusal_responses(404, 422), tags=["logs"])
+    @app.delete("/api/logs/{id}", status_code=204, responses=refusal_responses(404, 413, 422), tags=["logs"])
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name
         """Delete a log with its page and result; if it is running, it stops at once."""
         service.delete(id)
@@ -307,10 +313,9 @@ def _offer_pages(app: FastAPI, service: Service) -> None:
     @app.get(
         "/logs/{id}", response_class=HTMLResponse, responses=refusal_responses(404, 409, 422, page=True), tags=["pages"]
     )
-    def page(id: Identity) -> FileResponse:  # noqa: A002 - a path's name
+    def page(id: Identity) -> StreamingResponse:  # noqa: A002 - a path's name
         """Return the page of a log."""
-        path = service.page(id)
-        return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": policy_of_file(path)})
+        return page_on_disk(service.page(id))
 
     @app.get("/fleet", response_class=HTMLResponse, responses=refusal_responses(404, 409, page=True), tags=["pages"])
     async def fleet() -> HTMLResponse:

@@ -32,6 +32,7 @@ class PatientProtocol(H11Protocol):
 
     _headers_due: asyncio.TimerHandle | None = None
     _reading_due: asyncio.TimerHandle | None = None
+    _all_sent = False
 
     def connection_made(self, transport: Any) -> None:
         """Accept a connection, or reply that there are too many."""
@@ -48,6 +49,25 @@ class PatientProtocol(H11Protocol):
             return
         super().data_received(data)
         self._update_timer()
+
+    def eof_received(self) -> bool:
+        """Answer a client that has sent all and only listens now; return whether the connection stays open."""
+        if self.transport.is_closing():
+            return False
+        self._all_sent = True
+        if self.conn.their_state is h11.SEND_BODY and self.conn.our_state is h11.SEND_RESPONSE:
+            self.send_400_response("The body was cut off.")
+        return not self.transport.is_closing() and self._is_answering()
+
+    def on_response_complete(self) -> None:
+        """End the connection after the last answer if the client has sent all."""
+        super().on_response_complete()
+        if self._all_sent and not self._is_answering() and not self.transport.is_closing():
+            self.transport.close()
+
+    def _is_answering(self) -> bool:
+        cycle: Any = self.cycle
+        return cycle is not None and not cycle.response_complete
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""

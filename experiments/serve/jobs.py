@@ -29,6 +29,12 @@ VIEW_SECONDS = 60.0
 MOST_VIEWS = 8
 """Largest number of such pages in progress or waiting [count]."""
 
+KEEP_DELAY = 5.0
+"""Delay between attempts to store a result that the folder did not take [s]."""
+
+KEEPING = "worked out; its result waits until the server's folder takes it"
+"""Step of a log whose result is not stored yet."""
+
 T = TypeVar("T")
 
 
@@ -50,9 +56,10 @@ class Jobs:
     def __init__(self, settings: Settings, store: Store) -> None:
         self._settings, self._store = settings, store
         self._waiting: dict[str, Future[Any]] = {}
+        self._unkept: dict[str, tuple[StoredLog, LogResult]] = {}
         self._views = 0
         self._lock = threading.Lock()
-        self._closing = False
+        self._closing = threading.Event()
         context = multiprocessing.get_context("spawn")
         born: Any = {"initializer": begin_worker, "initargs": (os.getpid(), settings.memory), "context": context}
         self._pool = ProcessPool(max_workers=settings.workers, max_tasks=LOGS_PER_PROCESS, **born)
@@ -66,7 +73,7 @@ class Jobs:
     def resume(self) -> None:
         """Resume what an earlier server did not finish; a log is given up if several servers ended during its work."""
         for log in self._store.unfinished():
-            if phase_file(self._settings, log.id).exists():
+            if self.phase(log.id) is not None:
                 self._store.count_try(log.id)
                 if log.tries + 1 >= MOST_TRIES:
                     said = f"interrupted: the server ended {MOST_TRIES} times while it worked on this log"
@@ -84,7 +91,8 @@ class Jobs:
     def submit(self, log: StoredLog) -> None:
         """Put a log into the queue."""
         settings = self._settings
-        phase_file(settings, log.id).unlink(missing_ok=True)
+        with suppress(OSError):  # on a full disk, the steps of the work are not shown
+            phase_file(settings, log.id).write_bytes(b"")  # a process changes it, but never makes it: see `tell_phase`
         task = Task(
             log_file(settings, log.id),
             log.name,
@@ -105,12 +113,15 @@ class Jobs:
     def cancel(self, identity: str) -> None:
         """Cancel a log: remove it from the queue, or end the process that works on it."""
         with self._lock:
+            self._unkept.pop(identity, None)
             future = self._waiting.pop(identity, None)
         if future is not None:
             future.cancel()
 
     def phase(self, identity: str) -> str | None:
         """Return the current step of the work on a log; None while it waits."""
+        if identity in self._unkept:
+            return KEEPING
         with suppress(OSError):
             return phase_file(self._settings, identity).read_text(encoding="utf-8") or None
         return None
@@ -143,14 +154,14 @@ class Jobs:
 
     def close(self) -> None:
         """End the processes; the next server resumes unfinished work."""
-        self._closing = True
+        self._closing.set()
         for pool in (self._pool, self._drawing):
             pool.stop()
         for pool in (self._pool, self._drawing):
             pool.join()
 
     def _on_end(self, log: StoredLog, future: "Future[Any]") -> None:
-        if self._closing:
+        if self._closing.is_set():
             return
         with self._lock:
             taken_back = self._waiting.get(log.id) is not future
@@ -168,16 +179,42 @@ class Jobs:
         except Exception as error:  # the worker could not report its error
             worked = self._failed_result(error_sentence(error), log)
         try:
-            state = FAILED if worked.result["outcome"] == "failed" else DONE
-            self._store.finish(log.id, state, worked.result, worked.entries, worked.said)
-            if self._store.get(log.id) is None:
-                self._delete_files(log.id)
+            self._keep_or_wait(log, worked)
+        except Exception as error:  # the result is no JSON
+            self._keep_or_wait(log, self._failed_result(error_sentence(error), log))
+
+    def _keep_or_wait(self, log: StoredLog, worked: LogResult) -> None:
+        try:
+            self._keep(log, worked)
         except HydrostateError as error:
-            note(f"serve: what came of {log.name} is lost, the next start works on it again: {error}")
-        finally:
-            phase_file(self._settings, log.id).unlink(missing_ok=True)
-            with self._lock:
-                self._waiting.pop(log.id, None)
+            note(f"serve: the result of {log.name} cannot be stored yet, this is tried again: {error}")
+            self._keep_later(log, worked)
+
+    def _keep(self, log: StoredLog, worked: LogResult) -> None:
+        """Store the result of a log, which then leaves the queue."""
+        state = FAILED if worked.result["outcome"] == "failed" else DONE
+        self._store.finish(log.id, state, worked.result, worked.entries, worked.said)
+        if self._store.get(log.id) is None:
+            self._delete_files(log.id)
+        phase_file(self._settings, log.id).unlink(missing_ok=True)
+        with self._lock:
+            self._waiting.pop(log.id, None)
+            self._unkept.pop(log.id, None)
+
+    def _keep_later(self, log: StoredLog, worked: LogResult) -> None:
+        """Keep a result in memory until the store takes it; a server that ends before works on the log again."""
+        phase_file(self._settings, log.id).unlink(missing_ok=True)  # that end is not the log's fault
+        with self._lock:
+            alone = not self._unkept
+            self._unkept[log.id] = log, worked
+        if alone:
+            threading.Thread(target=self._keep_all, name="unkept results", daemon=True).start()
+
+    def _keep_all(self) -> None:
+        while self._unkept and not self._closing.wait(KEEP_DELAY):
+            for log, worked in list(self._unkept.values()):
+                with suppress(HydrostateError):
+                    self._keep(log, worked)
 
     def _failed_result(self, message: str, log: StoredLog) -> LogResult:
         entries = {"outcome": "failed", "reason": message} if log.verb == "diagnose" else None

@@ -37,6 +37,8 @@ COOKIE = "hydrostate_token"
 
 RETRY = (b"retry-after", b"5")
 
+CLOSE = (b"connection", b"close")
+
 HEADERS: Mapping[bytes, bytes] = {
     b"content-security-policy": b"default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     b"x-content-type-options": b"nosniff",
@@ -102,7 +104,7 @@ class Guard:
                 return
             await self._app(scope, exchange.receive, exchange.send)
         except RefusedError as refused:
-            again: list[tuple[bytes, bytes]] = [RETRY] if refused.status == 429 else []
+            again = [about for status, about in ((429, RETRY), (400, CLOSE)) if refused.status == status]
             page = wants_page(scope["method"], scope["path"], headers.get(b"accept", b"").decode("latin-1"))
             await exchange.answer(refused.status, refused.detail, again, page)
         finally:
@@ -112,6 +114,9 @@ class Guard:
         """Refuse or accept a request; return redirection headers if the address contained the token."""
         if self._busy > MOST_REQUESTS:
             raise RefusedError(429, f"more than {MOST_REQUESTS} requests are being answered, come again")
+        if b"content-length" in headers and b"transfer-encoding" in headers:
+            # a proxy may read the first and the server the second: one of them would take the body for a request
+            raise RefusedError(400, "a request must give Content-Length or Transfer-Encoding, not both")
         host = headers.get(b"host", b"").decode("latin-1").lower()
         if self._loopback and _host_name(host) not in self._names:
             raise RefusedError(421, f"this server answers for localhost alone, the request is for {host[:80]!r}")

@@ -1,13 +1,17 @@
 """The server's own pages, and the content security policy stored in saved pages."""
 
 import html
+import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from starlette.responses import StreamingResponse
+
+from experiments.serve.limits import RefusedError
 from experiments.serve.rigs import rig_files
 from experiments.serve.settings import MB, VERBS, Settings
 
@@ -27,6 +31,8 @@ MORE_FORMATS: Mapping[str, str] = {"nptdms": "TDMS", "asammdf": "MDF", "h5py": "
 HEAD = 4096
 """Length of the start of a page in which its policy is found [count]."""
 
+_PART = 1 << 16
+
 
 def policy_of(page: str) -> str:
     """Return the content security policy of a page, for the header; without one, the page is allowed nothing.
@@ -41,10 +47,28 @@ def policy_of(page: str) -> str:
     return f"{allowed}; frame-ancestors 'none'"
 
 
-def policy_of_file(path: Path) -> str:
-    """Return the content security policy of a page on disk."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        return policy_of(file.read(HEAD))
+def page_on_disk(path: Path) -> StreamingResponse:
+    """Return a page on disk as a response, which stays whole if the page is deleted meanwhile.
+
+    Raises
+    ------
+    RefusedError
+        If it was deleted before.
+    """
+    try:
+        file = path.open("rb")
+    except FileNotFoundError as error:
+        raise RefusedError(404, "the page was deleted") from error
+
+    def parts() -> Iterator[bytes]:
+        with file:
+            while part := file.read(_PART):
+                yield part
+
+    headers = {"Content-Length": str(os.fstat(file.fileno()).st_size)}
+    headers["Content-Security-Policy"] = policy_of(file.read(HEAD).decode("utf-8", "replace"))
+    file.seek(0)
+    return StreamingResponse(parts(), media_type="text/html", headers=headers)
 
 
 def home_page(settings: Settings) -> str:

@@ -97,18 +97,19 @@ class Service:
         Raises
         ------
         RefusedError
-            If the database accepts no more; the file is then deleted.
+                If folder or database accept no more; the file is then deleted.
         """
         place = log_file(self.settings, identity)
-        part.replace(place)
-        folder = os.open(place.parent, os.O_RDONLY)
         try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-        try:
+            part.replace(place)
+            folder = os.open(place.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
             kept = self.store.add(identity, name, verb, size)
-        except HydrostateError as error:
+        except (HydrostateError, OSError) as error:
+            part.unlink(missing_ok=True)
             place.unlink(missing_ok=True)
             raise RefusedError(413, f"the server's folder takes no more: {error}") from error
         self.room.add_received(size)
@@ -162,10 +163,22 @@ class Service:
         Raises
         ------
         RefusedError
-            If there is none.
+            If there is none, or the disk is so full that its row cannot be deleted.
         """
-        if not self.store.delete(identity):
+        try:
+            known = self.store.delete(identity)
+        except HydrostateError:  # the disk is full: the log's own files make room for the change
+            self.require_log(identity)
+            self._delete_files(identity)
+            try:
+                known = self.store.delete(identity)
+            except HydrostateError as error:
+                raise RefusedError(413, f"the log's files are deleted, its row is not: {error}") from error
+        if not known:
             raise RefusedError(404, f"there is no log {identity}")
+        self._delete_files(identity)
+
+    def _delete_files(self, identity: str) -> None:
         self.jobs.cancel(identity)
         for place in (log_file, page_file, phase_file):
             place(self.settings, identity).unlink(missing_ok=True)
@@ -274,7 +287,7 @@ class Service:
 
 def delete_orphans(settings: Settings, store: Store) -> None:
     """Delete files of logs that were deleted while they were processed."""
-    for folder in (settings.logs, settings.pages):
+    for folder in (settings.logs, settings.pages, settings.work):
         for path in folder.iterdir():
             if store.get(path.stem) is None:
                 with suppress(OSError):

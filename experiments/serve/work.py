@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -128,7 +129,7 @@ def process_log(task: Task) -> LogResult:
     blank: Mapping[str, Any] = {}
     with catch_log_warnings() as said:
         try:
-            task.phase.write_text(READING, encoding="utf-8")
+            tell_phase(task.phase, READING)
             blank = _blank_entries(task)
             worked = _inspect(task) if task.verb == "inspect" else _analyse(task)
         except MemoryError:
@@ -145,6 +146,16 @@ def process_log(task: Task) -> LogResult:
     return LogResult(_without_path(result, task), entries, _without_path(said, task))
 
 
+def tell_phase(path: Path, step: str) -> None:
+    """Tell the server the current step of the work on a log.
+
+    The file is changed but never made: if the log was deleted meanwhile, nothing is left of it.
+    """
+    with suppress(OSError), path.open("r+b") as file:
+        file.write(step.encode())
+        file.truncate()
+
+
 def _analyse(task: Task) -> LogResult:
     own = _rig(task)
     kind, bench, chosen, rig, prepared = _tools_of(task, own)
@@ -155,10 +166,10 @@ def _analyse(task: Task) -> LogResult:
             meant = infer_kind(error, task.plant, own)
             kind, bench, chosen, rig, prepared = _prepared_tools(meant, None, None, 0, task.verb)
             record = read_log(task.log, bench.columns, dict(task.columns), kind.required)
-    task.phase.write_text(WORKING, encoding="utf-8")
+    tell_phase(task.phase, WORKING)
     found = chosen.run(record, rig, prepared)
     result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
-    task.phase.write_text(WRITING, encoding="utf-8")
+    tell_phase(task.phase, WRITING)
     _write(task, page_of(chosen, with_remarks({"file": task.name, **result}, said), found, record))
     if task.verb != "diagnose":
         return LogResult(result, None)
@@ -174,7 +185,7 @@ def _inspect(task: Task) -> LogResult:
     from experiments.log_pages.inspected import inspect_log
 
     found, tables = inspect_log(task.log, task.plant)
-    task.phase.write_text(WRITING, encoding="utf-8")
+    tell_phase(task.phase, WRITING)
     _write(task, inspect_page({"file": task.name, **found}, tables))
     return LogResult({"outcome": "ok", **found}, None, INSPECTION_MESSAGES[bool(found["reads"])])
 

@@ -293,3 +293,29 @@ def test_the_page_of_an_actuator_is_served(served: Served, monkeypatch: pytest.M
     page = client.get("/actuator", params={"name": "A"})
     assert (page.status_code, page.text.count('<td class="name" data-head="log"><a href="logs/')) == (200, 2)
     assert client.get("/actuator", params={"name": "B"}).status_code == 404
+
+
+def test_a_page_that_is_deleted_between_two_steps_is_not_found(
+    served: Served, log: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client = served()
+    found = dropped(client, "run.csv", log)
+    whole = client.get(f"/logs/{found['id']}")
+    assert int(whole.headers["content-length"]) == len(whole.content)
+    monkeypatch.setattr("experiments.serve.service.Service.page", lambda *_: tmp_path / "gone.html")
+    answer = client.get(f"/logs/{found['id']}")
+    assert (answer.status_code, answer.json()) == (404, {"detail": "the page was deleted"})
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ("a\u202eb\u200b\ufeff\u061cc.csv", "abc.csv"),
+        ("\u200b", "log"),
+        ("\u200d.", "log"),
+        ("\U000e0041\u2028.csv", ".csv"),
+        ("\u0645\u06cc\u200c\u062e.csv", "\u0645\u06cc\u200c\u062e.csv"),
+    ],
+)
+def test_a_name_holds_nothing_that_cannot_be_seen(given: str, shown: str) -> None:
+    assert server.plain_name(given) == shown

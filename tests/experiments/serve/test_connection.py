@@ -225,3 +225,77 @@ def test_noise_before_any_request_is_refused() -> None:
 
     wire = asyncio.run(said())
     assert wire.written.startswith(b"HTTP/1.1 400")
+
+
+def test_a_client_that_sends_all_and_then_only_listens_gets_its_answer() -> None:
+    async def said() -> tuple[bool, bool, Wire]:
+        protocol, wire = connected()
+        protocol.data_received(ASKED)
+        stays = protocol.eof_received()
+        await answered(wire)
+        await asyncio.sleep(0)
+        closed = wire.closed
+        protocol.connection_lost(None)
+        return stays, closed, wire
+
+    stays, closed, wire = asyncio.run(said())
+    assert stays
+    assert wire.written.startswith(b"HTTP/1.1 204")
+    assert closed  # no further request can come
+
+
+def test_requests_sent_before_a_client_stops_sending_are_all_answered() -> None:
+    async def said() -> Wire:
+        protocol, wire = connected()
+        protocol.data_received(ASKED * 2)
+        assert protocol.eof_received()
+        for _ in range(1000):
+            if wire.closed:
+                break
+            await asyncio.sleep(0.5 * SOON)
+        protocol.connection_lost(None)
+        return wire
+
+    wire = asyncio.run(said())
+    assert wire.written.count(b"HTTP/1.1 204") == 2
+    assert wire.closed
+
+
+@pytest.mark.parametrize("sent", [b"", ASKED[:20], ASKED])
+def test_a_client_that_waits_for_no_answer_is_disconnected_when_it_stops_sending(sent: bytes) -> None:
+    async def said() -> bool:
+        protocol, wire = connected()
+        if sent:
+            protocol.data_received(sent)
+        if sent == ASKED:
+            await answered(wire)
+        stays = protocol.eof_received()
+        protocol.connection_lost(None)
+        return stays
+
+    assert not asyncio.run(said())
+
+
+def test_a_body_that_is_cut_off_is_refused_and_the_application_gets_a_disconnect() -> None:
+    heard: Heard = []
+
+    async def listens(_: Any, receive: Any, send: Any) -> None:
+        del send
+        while (message := await receive())["type"] != "http.disconnect":
+            heard.append("body")
+        heard.append(message["type"])
+
+    async def said() -> tuple[bool, Wire]:
+        protocol, wire = connected(listens)
+        protocol.data_received(POSTED + b"5\r\nhalf")
+        await asyncio.sleep(0)
+        stays = protocol.eof_received()
+        await asyncio.sleep(0.5 * SOON)
+        assert heard[-1:] == ["http.disconnect"]
+        protocol.connection_lost(None)
+        return stays, wire
+
+    stays, wire = asyncio.run(said())
+    assert not stays
+    assert wire.written.startswith(b"HTTP/1.1 400")
+    assert wire.closed

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from pebble import ProcessExpired
 
-from experiments.serve.jobs import MOST_TRIES, MOST_VIEWS, BusyError, Jobs, log_file, page_file, phase_file
+from experiments.serve.jobs import KEEPING, MOST_TRIES, MOST_VIEWS, BusyError, Jobs, log_file, page_file, phase_file
 from experiments.serve.service import Service
 from experiments.serve.settings import MB, Settings
 from experiments.serve.store import Store, StoredLog
-from experiments.serve.work import NO_MEMORY, LogResult
+from experiments.serve.work import NO_MEMORY, LogResult, tell_phase
 from plant.errors import HydrostateError
 
 
@@ -111,18 +111,59 @@ def test_a_log_whose_process_fails_gets_the_reason(
     assert words in str(found.message)
 
 
-def test_a_log_whose_result_cannot_be_stored_stays_unfinished(
+def test_a_result_that_cannot_be_stored_is_stored_as_soon_as_there_is_room(
     settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     worked = LogResult({"outcome": "ok", "message": "x" * 100_000}, None)
     monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_result(worked)), raising=False)
     monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
-    jobs, log = Jobs(settings, store), added(store, settings, "a")
+    monkeypatch.setattr("experiments.serve.jobs.KEEP_DELAY", 0.01)
+    jobs, logs = Jobs(settings, store), [added(store, settings, identity) for identity in ("a", "b", "c")]
     store._connection.execute("PRAGMA max_page_count = 1")
-    jobs.submit(log)
-    assert "what came of a.csv is lost" in capsys.readouterr().err
-    assert [one.id for one in store.unfinished()] == ["a"]
-    assert jobs.waiting == 0
+    for log in logs:
+        jobs.submit(log)
+    assert "the result of a.csv cannot be stored yet" in capsys.readouterr().err
+    assert [one.id for one in store.unfinished()] == ["a", "b", "c"]
+    assert (jobs.waiting, jobs.phase("a")) == (3, KEEPING)
+    assert not phase_file(settings, "a").exists()  # a server that ends now did not end because of this log
+    store.delete("b")
+    jobs.cancel("b")
+    assert jobs.phase("b") is None
+    store._connection.execute("PRAGMA max_page_count = 100000")
+    until(lambda: jobs.waiting == 0)
+    assert store.unfinished() == []
+    assert jobs.phase("a") is None
+    assert (store.result("a"), store.result("c")) == (worked.result, worked.result)
+    assert files_of(settings, "b") == []
+    jobs.close()
+
+
+def test_a_result_that_is_no_json_fails_its_log(
+    settings: Settings, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worked = LogResult({"outcome": "ok", "message": "", "value": float("inf")}, None)
+    monkeypatch.setattr(Ending, "ends", staticmethod(lambda future: future.set_result(worked)), raising=False)
+    monkeypatch.setattr("experiments.serve.jobs.ProcessPool", Ending)
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    found = store.get("a")
+    assert found is not None
+    assert (found.state, jobs.waiting) == ("failed", 0)
+    assert "please report it" in str(found.message)
+
+
+def test_a_process_that_outlives_its_deleted_log_leaves_no_file(
+    settings: Settings, store: Store, pending: list["Future[Any]"]
+) -> None:
+    jobs = Jobs(settings, store)
+    jobs.submit(added(store, settings, "a"))
+    tell_phase(phase_file(settings, "a"), "reading the log")
+    tell_phase(phase_file(settings, "a"), "working")
+    assert jobs.phase("a") == "working"
+    jobs.cancel("a")
+    assert pending[0].cancelled()
+    tell_phase(phase_file(settings, "a"), "writing the page")  # its process ends a moment later than its log
+    assert files_of(settings, "a") == []
 
 
 @pytest.fixture
@@ -199,7 +240,8 @@ def test_a_log_in_progress_stays_unfinished_if_the_server_closes(
     jobs.close()
     pending[0].set_exception(ProcessExpired("the pool was stopped", code=-15))
     assert [one.id for one in store.unfinished()] == ["a"]
-    assert files_of(settings, "a") == [log_file(settings, "a")]
+    assert files_of(settings, "a") == [log_file(settings, "a"), phase_file(settings, "a")]
+    assert jobs.phase("a") is None  # its work had not begun, so the next server does not count this as a try
 
 
 def test_a_cancelled_diagnosis_has_a_failed_row_in_the_fleet_and_an_estimate_has_none(

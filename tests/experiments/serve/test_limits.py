@@ -111,3 +111,29 @@ def test_a_refusal_after_an_answer_has_begun_sends_no_second_answer(tmp_path: Pa
     _, sent, ask = guarded(half, tmp_path)
     asyncio.run(ask())
     assert [message["type"] for message in sent] == ["http.response.start"]
+
+
+def test_a_request_with_two_statements_of_its_length_is_refused_and_its_connection_ends(tmp_path: Path) -> None:
+    async def taken(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    guard, sent, _ = guarded(taken, tmp_path)
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    lengths = [(b"content-length", b"6"), (b"transfer-encoding", b"chunked")]
+    for told in (lengths[:1], lengths[1:], lengths):
+        headers = [(b"host", b"localhost"), *told]
+        asyncio.run(
+            guard(
+                {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": headers}, receive, send
+            )
+        )
+    starts = [message for message in sent if message["type"] == "http.response.start"]
+    assert [start["status"] for start in starts] == [204, 204, 400]
+    assert [(b"connection", b"close") in start["headers"] for start in starts] == [False, False, True]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pebble import ProcessExpired
 
-from experiments.serve.jobs import BusyError, log_file, page_file
+from experiments.serve.jobs import BusyError, log_file, page_file, phase_file
 from experiments.serve.limits import RefusedError
 from experiments.serve.server import _address  # pyright: ignore[reportPrivateUsage]
 from experiments.serve.service import Service
@@ -156,11 +156,13 @@ def test_opening_removes_files_without_a_log_and_keeps_the_others(service: Servi
     for identity in ("a", "gone"):
         page_file(service.settings, identity).write_text("page")
     log_file(service.settings, "gone").write_bytes(b"a")
+    phase_file(service.settings, "gone").write_text("reading the log")
     service.close()
     again = Service(Settings(folder=tmp_path / "kept"))
     again.open()
     assert [path.name for path in service.settings.logs.iterdir()] == ["a"]
     assert [path.name for path in service.settings.pages.iterdir()] == ["a.html"]
+    assert list(service.settings.work.iterdir()) == []
     assert again.page("a") == page_file(again.settings, "a")
     again.close()
     service.open()
@@ -195,6 +197,46 @@ def test_a_log_that_the_database_cannot_store_is_refused_and_leaves_no_file(serv
     assert refused.value.status == 413
     assert list(service.settings.logs.iterdir()) == []
     assert service.jobs.waiting == 0
+
+
+@pytest.mark.parametrize(("failures", "status"), [(1, None), (2, 413)])
+def test_on_a_full_disk_the_files_of_a_deleted_log_make_room_for_the_change(
+    service: Service, monkeypatch: pytest.MonkeyPatch, failures: int, status: int | None
+) -> None:
+    kept(service, "a")
+    page_file(service.settings, "a").write_text("page")
+    delete, there = service.store.delete, list[bool]()
+
+    def when_there_is_room(identity: str) -> bool:
+        there.append(log_file(service.settings, "a").exists())
+        if len(there) <= failures:
+            raise HydrostateError("database or disk is full")
+        return delete(identity)
+
+    monkeypatch.setattr(service.store, "delete", when_there_is_room)
+    if status is None:
+        service.delete("a")
+        assert service.store.get("a") is None
+    else:
+        with pytest.raises(RefusedError, match="its row is not") as refused:
+            service.delete("a")
+        assert refused.value.status == status
+    assert there == [True, False]
+    assert not page_file(service.settings, "a").exists()
+
+
+def test_a_log_that_the_folder_cannot_take_is_refused(
+    service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = tmp_path / "a.part"
+    part.write_bytes(b"a,b\n")
+    monkeypatch.setattr(
+        service.settings.logs.__class__, "replace", lambda *_: (_ for _ in ()).throw(OSError(28, "full"))
+    )
+    with pytest.raises(RefusedError, match="takes no more") as refused:
+        service.take_in("a", part, "a.csv", "diagnose", 4)
+    assert refused.value.status == 413
+    assert not part.exists()
 
 
 def test_a_folder_with_an_invalid_database_is_released_for_the_next_server(tmp_path: Path, in_threads: None) -> None:  # noqa: ARG001

@@ -22,6 +22,7 @@ def stack_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def task(log: Path, folder: Path, **changes: Any) -> Task:
+    (folder / "phase").touch()  # as the server does
     given = {"name": "mine.csv", "verb": "diagnose", "plant": "piezo-stack", "rig": None, "columns": ()}
     return Task(**{"log": log, "page": folder / "page.html", "phase": folder / "phase", **given, **changes})
 
