@@ -168,6 +168,11 @@ def _outside_faults(result: Mapping[str, Any]) -> list[str]:
     return [OUTSIDE[one["code"]] for one in result["notes"] if one["code"] in OUTSIDE]
 
 
+def is_other_fault(result: Mapping[str, Any]) -> bool:
+    """Return whether the verdict names a fault that is none of the nine conditions."""
+    return bool(result["unknown"] and _outside_faults(result))
+
+
 def _named_fault(result: Mapping[str, Any]) -> list[str]:
     """Return the fault outside the nine conditions by name, or else as a size between theirs."""
     found = _outside_faults(result)

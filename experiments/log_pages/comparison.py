@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LEAST_SHARE = 1e-3
 """Conditions that are less likely than this in both logs are not shown [probability]."""
 
+DOUBTED = "not reliable"
+"""Comment on every quantity if a model fits one of the logs so badly that its numbers mean nothing."""
+
 MOST_NAMED = 6
 """Largest number of quantities named in a title [count]."""
 
@@ -39,7 +42,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         {
             "file": one["file"],
             "message": plain_words(one) or sentence(one.get("message") or ""),
-            "unknown": one.get("unknown"),
+            "doubted": is_unreliable(one),
         }
         for one in (first, second)
     ]
@@ -49,8 +52,8 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "turned": identities and f"compare?first={identities[1]}&second={identities[0]}",
         "title": title,
         "changes": changes,
-        "quantities": quantities_shown(rows),
-        "probabilities": _probabilities_shown(first.get("probabilities"), second.get("probabilities")),
+        "quantities": quantities_shown(rows, doubted=is_unreliable(first) or is_unreliable(second)),
+        "probabilities": _probabilities_shown(*(_fitting_conditions(one) for one in (first, second))),
     }
     names = [log["file"] for log in logs]
     headed = {
@@ -67,18 +70,34 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
     return render_page("log_pages/compare.html", facts, headed, {})
 
 
-def quantities_shown(rows: Sequence[Mapping[str, Any]]) -> "pd.DataFrame":
-    """Return the quantities of two logs in the reader's units, with a comment on each."""
+def quantities_shown(rows: Sequence[Mapping[str, Any]], *, doubted: bool = False) -> "pd.DataFrame":
+    """Return the quantities of two logs in the reader's units, with a comment on each.
+
+    Parameters
+    ----------
+    doubted : bool
+        Whether the numbers of a log are not reliable, so that no quantity is said to have changed or not.
+    """
     import pandas as pd
 
-    shown = [
-        {
-            **_in_reader_unit(row),
-            "says": "changed" if row["changed"] else "no certain change" if row["interval"] else "not in both logs",
-        }
-        for row in rows
-    ]
-    return pd.DataFrame(shown)
+    def comment(row: Mapping[str, Any]) -> str:
+        if not row["interval"]:
+            return "not in both logs"
+        return DOUBTED if doubted else "changed" if row["changed"] else "no certain change"
+
+    return pd.DataFrame([{**_in_reader_unit(row), "says": comment(row)} for row in rows])
+
+
+def is_unreliable(result: Mapping[str, Any]) -> bool:
+    """Return whether the numbers of a log are not reliable, because none of the models fits it."""
+    from experiments.eha.plain_verdict import is_doubted
+
+    return bool(result.get("unknown")) and (not plain_words(result) or is_doubted(result))
+
+
+def _fitting_conditions(result: Mapping[str, Any]) -> Mapping[str, float] | None:
+    """Return the probabilities of the conditions; None if none of them fits."""
+    return None if is_unreliable(result) else result.get("probabilities")
 
 
 def _probabilities_shown(first: Mapping[str, float] | None, second: Mapping[str, float] | None) -> "pd.DataFrame":
@@ -227,7 +246,13 @@ def headings(first: Mapping[str, Any], second: Mapping[str, Any], rows: Sequence
     rows : sequence of Mapping
         From `comparison_rows`.
     """
-    return [one for one in (_conditions_of(first, second), title_of(rows)) if one]
+    doubted = [str(one["file"]) for one in (first, second) if is_unreliable(one)]
+    changes = (
+        f"Nothing certain can be said of what changed: the numbers of {joined_names(doubted)} are not reliable."
+        if doubted
+        else title_of(rows)
+    )
+    return [one for one in (_conditions_of(first, second), changes) if one]
 
 
 def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
@@ -239,10 +264,12 @@ def _conditions_of(first: Mapping[str, Any], second: Mapping[str, Any]) -> str:
 
 
 def _verdict_words(result: Mapping[str, Any]) -> str:
-    from experiments.eha.plain_verdict import is_of_another_size, size_in_words
+    from experiments.eha.plain_verdict import is_of_another_size, is_other_fault, size_in_words
 
     if not result.get("unknown"):
         return condition_in_words(result["condition"])
+    if is_other_fault(result):
+        return "a fault beside the nine conditions"
     return size_in_words(result) if is_of_another_size(result) else "no verdict"
 
 

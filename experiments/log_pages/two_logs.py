@@ -17,6 +17,7 @@ from experiments.log_pages.comparison import (
     compare_view,
     comparison_rows,
     headings,
+    is_unreliable,
     plain_words,
     quantities_shown,
 )
@@ -87,10 +88,11 @@ def _comparison_screen(first: Mapping[str, Any], second: Mapping[str, Any]) -> "
     rows = comparison_rows(first, second)
     doubt = " Do not rely on its numbers."
     said = [
-        f"{one['file']}: {plain_words(one) or one['message']}{doubt if one.get('unknown') else ''}"
+        f"{one['file']}: {plain_words(one) or one['message']}{doubt if is_unreliable(one) else ''}"
         for one in (first, second)
     ]
     shown = table("quantity", "verdict", first["file"], second["file"], "difference", "95 % interval of the difference")
-    for row in quantities_shown(rows).to_dict("records"):
+    doubted = is_unreliable(first) or is_unreliable(second)
+    for row in quantities_shown(rows, doubted=doubted).to_dict("records"):
         shown.add_row(*(row[name] for name in ("quantity", "says", "first", "second", "difference", "interval")))
     return [*headings(first, second, rows), "", *said, shown]

@@ -97,7 +97,6 @@ HALF_MINOR = AgainstCode.BETWEEN_CONDITIONS.note(leakage=0.5, friction=0.0).to_d
     ("second", "title"),
     [
         ({"condition": "normal"}, "From major leakage to normal."),
-        ({"condition": "normal", "unknown": True}, "From major leakage to no verdict."),
         (
             {"condition": "normal", "unknown": True, "reasons": ["one"], "notes": [HALF_MINOR]},
             "From major leakage to leakage between none and minor.",
@@ -111,6 +110,46 @@ def test_the_heading_of_two_diagnoses_names_both_conditions(second: dict[str, An
     page = compare_view(first, {**first, **second})
     assert f"<h1>{title}</h1>" in page
     assert '<p class="answer">No certain difference between the two logs.</p>' in page
+
+
+WORN = {"code": "pump_worn", "severity": "warning", "text": "the pump is worn", "data": {}}
+
+
+@pytest.mark.parametrize(
+    ("notes", "title"),
+    [
+        ([], "From major leakage to no verdict."),
+        ([WORN], "From major leakage to a fault beside the nine conditions."),
+    ],
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_nothing_is_said_to_have_changed_if_no_model_fits_one_of_the_logs(
+    notes: list[dict[str, Any]], title: str, turned: bool
+) -> None:
+    shares = {"major_leakage": 1.0}
+    first = result(2.0, 0.1, condition="major_leakage", unknown=False, probabilities=shares, notes=[], reasons=[])
+    second = result(9.0, 0.1, condition="normal", unknown=True, probabilities={"normal": 1.0}, notes=notes)
+    second |= {"file": "b.csv", "reasons": ["the pump is worn"]}
+    page = compare_view(*((second, first) if turned else (first, second)))
+    assert turned or f"<h1>{title}</h1>" in page
+    assert "Nothing certain can be said of what changed: the numbers of b.csv are not reliable." in page
+    assert "In the second log" not in page
+    assert ">changed<" not in page
+    assert ">not reliable<" in page
+    assert page.count("Do not rely on its numbers") == 1
+    conditions = page.split('id="conditions"')[1]
+    assert "normal" not in conditions  # the nearest condition of a log that fits none
+    assert "A dash: none of the nine fits the log." in conditions
+
+
+def test_a_fault_between_two_conditions_is_compared_as_its_page_shows_it() -> None:
+    shares = {"major_leakage": 1.0}
+    first = result(2.0, 0.1, condition="major_leakage", unknown=False, probabilities=shares, notes=[], reasons=[])
+    second = {**result(9.0, 0.1), "condition": "normal", "unknown": True, "probabilities": {"normal": 1.0}}
+    second |= {"reasons": ["one"], "notes": [HALF_MINOR]}
+    page = compare_view(first, second)
+    assert "In the second log, added friction is higher." in page
+    assert "Do not rely" not in page
 
 
 def test_a_comparison_links_to_both_logs_the_list_and_the_reverse_comparison() -> None:
