@@ -14,6 +14,7 @@ from experiments.fleet.actuators import ActuatorRow
 from experiments.fleet.outlook import REACHED, Outlook, outlook_of
 from experiments.fleet.page import IF_RIG_RIGHT, finding_text, no_verdict_since, worst_severity_text
 from experiments.fleet.rows import STATES, LogRow
+from experiments.fleet.to_do import what_to_do
 from experiments.page.charts import Charts
 from experiments.page.names_shown import QUANTITY_NAMES
 from experiments.page.numbers import MISSING, decimals_of, fixed, number, shop_unit
@@ -87,6 +88,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({finding_text(row.last)})' if row.last.between else ''}.",
         "outlook": _sentence(worst) if worst is not None and row.last.has_verdict else _no_verdict_text(row),
+        "to_do": what_to_do(row, has_page=row.last.file in pages),
         "log": pages.get(row.last.file),
         "fleet": fleet,
         "apart": _log_spacing(outlooks),

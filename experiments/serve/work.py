@@ -1,5 +1,6 @@
 """The work on a log, in a process that may be killed at any time: it writes a complete page, or none at all."""
 
+import errno
 import os
 import sys
 from collections.abc import Mapping
@@ -41,6 +42,8 @@ INSPECTION_MESSAGES: Mapping[bool, str] = {
     False: "The columns that could be guessed are too few to read the log; its page shows them.",
 }
 """Result of an inspection, by whether the log can be read with the guessed columns."""
+
+DISK_FULL = "the disk of the server is full, so its page could not be written: make room, then drop this log again"
 
 NO_MEMORY = 77
 """Exit code of a process whose log needed more memory than there is. The process ends, since the memory that it still
@@ -139,7 +142,8 @@ def process_log(task: Task) -> LogResult:
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # report any error of a log to its sender
-            worked = _failed(task, blank, error_sentence(error))
+            full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+            worked = _failed(task, blank, DISK_FULL if full else error_sentence(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
     entries = _without_path(plain(worked.entries), task)

@@ -94,7 +94,7 @@
       width,
       height: (width < NARROW ? HEIGHT.narrow : HEIGHT.wide) + (last ? 36 : 0),
       legend: { show: false },
-      padding: [10, 24, last ? 0 : 8, 0], // room for half of the lowest number where no axis is below it
+      padding: [10, figure.x.dates ? 38 : 24, last ? 0 : 8, 0], // room for half of the last date, and of the lowest number where no axis is below it
       cursor: { sync: { key: figure.group }, drag: { x: true, y: false } },
       scales: { x: scaleOf(figure.x), y: panel.ends ? { range: () => panel.ends } : {} },
       axes: [

@@ -94,6 +94,19 @@ def test_an_internal_error_is_a_failed_result(stack_log: Path, tmp_path: Path, m
     assert "internal error" in found.result["message"]
 
 
+def test_a_full_disk_is_no_error_of_the_program(
+    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(work, "replacing", full)
+    found = process_log(task(stack_log, tmp_path))
+    assert found.result["outcome"] == "failed"
+    assert "make room, then drop this log again" in str(found.result["message"])
+    assert "report" not in str(found.result["message"])
+
+
 def test_a_log_that_needs_too_much_memory_ends_the_process_with_a_special_code(
     stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
