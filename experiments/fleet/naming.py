@@ -25,9 +25,6 @@ FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date
 NO_ACTUATOR = ("bench", "capture", "data", "export", "file", "log", "measurement", "record", "run", "scope", "test")
 """Words before a date that do not name an actuator."""
 
-MATCHING = 0.8
-"""Smallest share of file names that must contain one date each before names are used [fraction]."""
-
 
 @dataclass(frozen=True)
 class ActuatorAndDate:
@@ -179,7 +176,7 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDat
     """Read actuator and date from file names that hold one date each, such as P-12_20261122_143000.csv.
 
     The actuator is the rest of the name without the date. If the rest is empty, or a word such as "log", the actuator
-    is the folder's name.
+    is the folder's name. Each name is read alone: a log without a date, dropped on a server, separates no others.
 
     Parameters
     ----------
@@ -191,8 +188,7 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDat
     Returns
     -------
     dict[str, Named]
-        By file. Empty if names do not group the logs: fewer than `MATCHING` of them contain one date and an actuator,
-        or no actuator has two logs.
+        By file. Empty if names do not group the logs: no actuator has two logs.
 
     Examples
     --------
@@ -202,8 +198,7 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDat
     """
     found = {file: _by_date(f"{folder}/{file}".replace("\\", "/")) for file in files}
     named = [one.actuator for one in found.values() if one.actuator]
-    together = len(named) >= MATCHING * len(found) and len(set(named)) < len(named)
-    return without_wrong_clocks(found) if together else {}
+    return without_wrong_clocks(found) if len(set(named)) < len(named) else {}
 
 
 def actuator_in_name(name: str, pattern: str | None) -> str:

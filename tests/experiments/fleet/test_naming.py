@@ -74,7 +74,6 @@ def test_file_names_with_one_date_each_give_the_actuator(files: list[str], actua
     "files",
     [
         ["run1_20261122.csv", "run2_20261122.csv"],  # nothing shows that both are of one actuator
-        ["A_20261122.csv", "A_20261123.csv", "notes.csv"],
         ["A_20261322.csv", "A_20261323.csv"],
         ["serial 120261122.csv", "serial 120261123.csv"],
         ["A_20261122-20261123.csv", "A_20261124-20261125.csv"],
@@ -84,6 +83,13 @@ def test_file_names_with_one_date_each_give_the_actuator(files: list[str], actua
 )
 def test_file_names_that_do_not_group_logs_by_date_give_no_actuator(files: list[str]) -> None:
     assert by_dates(files) == {}
+
+
+def test_logs_without_a_date_separate_no_others() -> None:
+    dated = ["A_20261122.csv", "A_20261123.csv"]
+    found = by_dates([*dated, *(f"notes {place}.csv" for place in range(20))])
+    assert [found[file].actuator for file in dated] == ["A", "A"]
+    assert {one.actuator for file, one in found.items() if file not in dated} == {""}
 
 
 def test_an_invalid_date_excludes_only_its_own_log() -> None:
