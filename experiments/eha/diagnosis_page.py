@@ -27,11 +27,10 @@ from experiments.page.charts import Charts
 from experiments.page.numbers import MINUS, percent_text
 from experiments.page.panels import Curve, Mark, Panel
 from experiments.page.render import render_page
-from experiments.page.sentences import sentence
+from experiments.page.sentences import rig_advice, sentence
 from experiments.page.severity_rows import severity_rows
 from experiments.page.words import condition_in_words
 from faults.diagnosis.circuits.blocks import blocks_of
-from plant.eha.rig import UNNAMED
 
 if TYPE_CHECKING:
     from estimation.finding import Finding
@@ -39,9 +38,6 @@ if TYPE_CHECKING:
 
 CHANNELS = (("velocity", "mm/s", 1e3), ("pressure", "bar", 1e-5))
 """Channels that a circuit is fitted to: name, unit shown and factor from SI."""
-
-RIG_ADVICE = "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."
-"""Advice if there is no rig file for the log."""
 
 LEAST_SHARE = 0.0005
 """Probability below which a condition is described as having almost none [probability]."""
@@ -62,7 +58,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "file": name,
         "title": verdict(result),
         "to_do": what_to_do(result),
-        "describe": RIG_ADVICE if result["rig"] == UNNAMED else "",
+        "describe": rig_advice(result),
         "sureness": confidence_cost_onset(result),
         "reasons": separate_reasons(result),
         "another_size": is_of_another_size(result),

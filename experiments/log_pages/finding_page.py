@@ -15,7 +15,7 @@ from experiments.page.condition_names import condition_in_words
 from experiments.page.names_shown import quantity_name
 from experiments.page.numbers import MISSING, number, percent_text, pretty_unit, reader_unit, with_equal_decimals
 from experiments.page.render import render_page
-from experiments.page.sentences import sentence, unused_column_advice
+from experiments.page.sentences import rig_advice, sentence, unused_column_advice
 from experiments.page.tables import Column
 
 if TYPE_CHECKING:
@@ -32,8 +32,14 @@ ACTUATORS = {
 LEAST_SHARE = 0.001
 """Conditions with a lower probability are not listed [probability]."""
 
-OTHER_OIL = frozenset({EstimateCode.STIFFER_THAN_RIG, EstimateCode.SOFTER_THAN_RIG})
-"""Notes that are also listed as advice, since they say what to correct."""
+ALSO_ADVICE = (EstimateCode.STIFFER_THAN_RIG, EstimateCode.SOFTER_THAN_RIG, EstimateCode.KNOWN_AS_THE_RIG)
+"""Notes that are also listed as advice, since they say what to correct or to measure."""
+
+FRICTION_UNLIKE = (
+    "Log differential pressure: bulk modulus then needs no friction model. Until you do, hydrostate diagnose fits the "
+    "whole circuit to this log and gives a rough bulk modulus."
+)
+"""Advice if no friction model of the estimate explains the motion."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 """A space that prevents a line break."""
@@ -60,8 +66,10 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
     shown = {**found.quantities, **found.severities}
     shares = sorted(found.probabilities.items(), key=lambda item: -item[1])
     file = Path(result["file"]).name
-    unlike = [note for note in found.notes if note.code in OTHER_OIL]
-    to_do = [*unused_column_advice(result), *(sentence(str(note)) for note in (*found.advice, *unlike))]
+    also = [note for note in found.notes if note.code in ALSO_ADVICE]
+    to_do = [*unused_column_advice(result), *(sentence(str(note)) for note in (*found.advice, *also))]
+    if any(one.code == EstimateCode.POSITION_RESIDUALS_LARGE for one in found.gate.reasons):
+        to_do.insert(0, FRICTION_UNLIKE)
     noted = [sentence(one["text"]) for one in result["notes"]]
     against = list(dict.fromkeys(map(str, (*found.against, *found.gate.reasons))))
     title = _title(found)
@@ -75,6 +83,7 @@ def finding_page(result: Mapping[str, Any], found: "Finding", record: "Record") 
         "actuator": ACTUATORS.get(found.actuator, found.actuator),
         "message": sentence(message) if message else "",
         "to_do": to_do,
+        "describe": rig_advice(result),
         "doubts": [
             sentence(one)
             for one in against

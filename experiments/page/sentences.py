@@ -70,3 +70,16 @@ def unused_column_advice(result: Mapping[str, Any]) -> list[str]:
     """
     codes = (LogCode.COLUMN_OVERLOOKED, LogCode.CHAMBER_ALONE)
     return [sentence(one["text"]) for one in result.get("notes", ()) if one["code"] in codes]
+
+
+def rig_advice(result: Mapping[str, Any]) -> str:
+    """Return what to do if there is no rig file for a log; empty if there is one.
+
+    Examples
+    --------
+    >>> rig_advice({"rig": "P-12"})
+    ''
+    """
+    if result["rig"] != UNNAMED:
+        return ""
+    return "Describe your actuator in a rig file: without one, these numbers are for the paper's actuator."

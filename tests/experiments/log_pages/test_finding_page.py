@@ -2,12 +2,21 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.notes import ChannelCode, EstimateCode
 from experiments.log_pages.entries import message_of
-from experiments.log_pages.finding_page import _message_rest, _row, _title, _with_first_reason
+from experiments.log_pages.finding_page import (
+    FRICTION_UNLIKE,
+    _message_rest,
+    _row,
+    _title,
+    _with_first_reason,
+    finding_page,
+)
+from plant.log.record import Record
 
 PASSED, DOUBTED = Gate(True, ()), Gate(False, (EstimateCode.DIVERGED.note(),))
 
@@ -48,6 +57,34 @@ def found(**changes: object) -> Finding:
 )
 def test_the_title_states_result_gate_and_outcome(changes: dict[str, object], title: str) -> None:
     assert _title(found(**changes)).startswith(title)
+
+
+def page_of(rig: str, **changes: object) -> str:
+    one = found(**changes)
+    notes = [note.to_dict() for note in one.notes]
+    result = {"file": "run.csv", "rig": rig, "message": message_of(one), "notes": notes}
+    record = Record(1e-3, {"velocity_m_s": np.linspace(0.0, 1.0, 20)})
+    return finding_page(result, one, record)
+
+
+MEASURE = EstimateCode.KNOWN_AS_THE_RIG.note(entry="chamber_volume", percent=91.0, quantity="bulk_modulus")
+
+
+def test_what_to_measure_and_to_describe_is_among_what_to_do() -> None:
+    page = page_of("paper", notes=(MEASURE,))
+    to_do = page.split('<ol class="todo">')[1].split("</ol>")[0]
+    assert "<li>Measure chamber_volume: " in to_do
+    assert '<li class="screen-only">Describe your actuator in a rig file' in to_do
+    assert page.count("Measure chamber_volume") == 1
+    assert "Describe your actuator" not in page_of("P-12", notes=(MEASURE,))
+    assert "What to do" not in page_of("P-12")
+    assert '<div class="screen-only">\n<h2 class="first">What to do' in page_of("paper")
+
+
+def test_a_friction_model_that_does_not_fit_is_followed_by_what_helps() -> None:
+    doubted = Gate(False, (EstimateCode.POSITION_RESIDUALS_LARGE.note(ratio=2.3, motion_percent=0.2),))
+    assert FRICTION_UNLIKE in page_of("P-12", gate=doubted)
+    assert FRICTION_UNLIKE not in page_of("P-12", gate=DOUBTED)
 
 
 def test_the_opening_sentence_gives_the_first_reason_and_counts_the_others() -> None:
