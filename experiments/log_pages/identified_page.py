@@ -1,6 +1,7 @@
 """The page of an identified model: its quality, its uses, its charts, and its numbers to download."""
 
 import math
+import re
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -8,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from estimation.arrays import Array
 from estimation.finding import NORMAL_95
 from experiments.command.json_output import json_text
 from experiments.log_pages.identified_charts import (
@@ -19,8 +19,9 @@ from experiments.log_pages.identified_charts import (
     run_charts,
     step_charts,
 )
+from experiments.log_pages.identified_files import control_text, matlab_text
 from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView
-from experiments.log_pages.identified_words import answer_of, has_limits, notes_of, tests_of, title_of, uses_of
+from experiments.log_pages.identified_words import answer_of, notes_of, tests_of, title_of, uses_of
 from experiments.page.numbers import MISSING, number, with_equal_decimals
 from experiments.page.render import render_page
 from experiments.page.tables import Column, right_aligned
@@ -188,37 +189,9 @@ def _downloads(view: IdentifiedView, stem: str) -> Iterator[tuple[str, str, str]
     yield f"{stem}-model.json", _address(json_text([view.result]), "application/json"), "the model as JSON"
     if view.is_linear:
         yield f"{stem}-model.py", _address(control_text(view), "text/x-python"), "a Python file for python-control"
+        name = re.sub(r"[^A-Za-z0-9_]", "_", f"model_of_{stem}")  # what MATLAB can run is named like a variable
+        yield f"{name}.m", _address(matlab_text(view), "text/x-matlab"), "a script for MATLAB"
 
 
 def _address(text: str, kind: str) -> str:
     return f"data:{kind};base64,{b64encode(text.encode()).decode('ascii')}"
-
-
-def control_text(view: IdentifiedView) -> str:
-    """Return a Python file that builds the model as a python-control object."""
-    linear, names = view.linear, view.names
-    if linear is not None and linear.continuous:
-        numerators, denominators, clock = [linear.numerator], [linear.denominator], "0"
-        late = f"# Its dead time of {linear.dead_time!r} s is left out.\n" if linear.dead_time else ""
-    else:
-        length = max(max(b.size, f.size) for b, f in view.transfers)
-        numerators, denominators = (
-            [np.pad(one, (0, length - one.size)) for one in each] for each in zip(*view.transfers, strict=True)
-        )
-        clock, late = repr(view.sample_time), ""
-    offset = view.result.get("offset")
-    told = f"# The output also has an offset of {offset!r}, which a transfer function leaves out.\n" if offset else ""
-    told += "# The output also has limits, which a transfer function leaves out.\n" if has_limits(view) else ""
-    if view.result.get("error_model"):
-        told += "# The model also has an error model, which a transfer function leaves out.\n"
-    return (
-        f"# Identified by Hydrostate from {view.result['file']!r}.\n{late}{told}"
-        "import control\n\n"
-        "model = control.TransferFunction(\n"
-        f"    [{_coefficients_text(numerators)}],\n    [{_coefficients_text(denominators)}],\n    {clock},\n"
-        f"    inputs={list(names)!r},\n    outputs={[view.result['output']]!r},\n)\n"
-    )
-
-
-def _coefficients_text(rows: Sequence[Array]) -> str:
-    return f"[{', '.join(repr(row.tolist()) for row in rows)}]"

@@ -1,6 +1,7 @@
 """The page of `hydrostate inspect`: columns with guesses and reasons, the rig file's block, a chart of each column."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ def inspect_page(result: Mapping[str, Any], tables: "Sequence[TableFacts]") -> s
     guessed = guessed_units(result["tables"])
     unsure = "; check the units that were guessed" if guessed else ""
     facts = {
-        "result": result,
+        "result": {**result, "file": Path(result["file"]).name},  # a page is passed on, and names no folder
         "title": f"This log can be diagnosed{unsure}." if result["reads"] else "This log cannot be diagnosed yet.",
         "message": f"{result['message'][:1].upper()}{result['message'][1:]}.",
         "block": columns_block(result["columns"], guessed),

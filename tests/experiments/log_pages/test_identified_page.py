@@ -19,7 +19,8 @@ from estimation.identification.model.linear_model import LinearModel
 from experiments.cli import app
 from experiments.identification.entries import linear_entries
 from experiments.log_pages.identified_charts import MeasuredCurve, bode_charts, measured_curve, step_charts
-from experiments.log_pages.identified_page import control_text, identified_page
+from experiments.log_pages.identified_files import control_text, matlab_text
+from experiments.log_pages.identified_page import identified_page
 from experiments.log_pages.identified_view import IdentifiedView, view_of_channels
 from experiments.log_pages.identified_words import (
     answer_of,
@@ -160,6 +161,16 @@ def test_the_model_can_be_downloaded_completely_and_without_the_folder_of_the_lo
     assert numerators == [[TRUTH.numerator.tolist()]]
     assert (denominators, clock) == ([[TRUTH.denominator.tolist()]], 1e-3)
     assert names == {"inputs": ["motor_speed_rad_s"], "outputs": ["velocity_m_s"]}
+    script = files["model_of_run.m"].splitlines()
+    assert script[0] == "% Identified by Hydrostate from 'run.csv'."
+    length = max(TRUTH.numerator.size, TRUTH.denominator.size)
+    rows = [np.pad(one, (0, length - one.size)).tolist() for one in (TRUTH.numerator, TRUTH.denominator)]
+    assert script[-4:] == [
+        f"model = tf({{{rows[0]!r}}}, {{{rows[1]!r}}}, ...",
+        "    0.001, 'Variable', 'z^-1');",
+        "model.InputName = {'motor_speed_rad_s'};",
+        "model.OutputName = 'velocity_m_s';",
+    ]
 
 
 def test_a_continuous_time_model_is_downloaded_as_such_and_its_step_response_has_a_band() -> None:
@@ -171,6 +182,9 @@ def test_a_continuous_time_model_is_downloaded_as_such_and_its_step_response_has
     text = control_text(one)
     assert "dead time of 0.002 s" in text
     assert "[[[30.0]]]" in text
+    script = matlab_text(replace(one, result={**entries, "output": "it's\ny"}))
+    assert "tf({[30.0]}, {[1.0, 100.0]}, ...\n    'Variable', 's', 'InputDelay', 0.002);" in script
+    assert "model.OutputName = 'it''s\\x0ay';" in script
     (panel,) = step_charts(one, "run").panels
     assert [curve.name for curve in panel.curves] == ["u +100", "95 % from", "95 % to"]
     assert panel.curves[0].values[-1] == pytest.approx(30.0, rel=0.02)

@@ -30,6 +30,15 @@ def test_the_heading_says_whether_the_log_can_be_diagnosed(tmp_path: Path) -> No
     assert "<h1>This log cannot be diagnosed yet.</h1>" in page_of(tmp_path, "time_s,M1", TIME, SPEED)
 
 
+def test_the_page_names_no_folder(tmp_path: Path) -> None:
+    page_of(tmp_path, "time_s,motor_speed_rad_s", TIME, SPEED)
+    path = tmp_path / "E9_1.csv"
+    found, tables = inspect_log(path, None)
+    page = inspect_page({"file": str(path), **found}, tables)
+    assert "E9_1.csv" in page
+    assert str(tmp_path) not in page
+
+
 def drawing(page: str) -> str:
     return b64decode(page.split("base64,")[1].split('"')[0]).decode()
 
