@@ -47,7 +47,8 @@ async def event_stream(stream: Stream, streams: Streams, gone: Callable[[], Awai
         number, fresh = stream.revision
         history = stream.since(0)
         events = await asyncio.to_thread(stream.events)
-        yield message("history", {**stream.state, "history": history, "events": events})
+        # a browser's clock may differ: the age of the last gauges is told by the server's
+        yield message("history", {**stream.state, "history": history, "events": events, "now": time.time()})
         spoke = time.monotonic()
         while not await gone():
             await asyncio.sleep(GAUGE_INTERVAL)

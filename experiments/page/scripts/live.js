@@ -4,6 +4,7 @@
 (() => {
   const KEPT = 2400; // gauges that are kept, as the server does
   const DRAWN = 500; // time between two drawings [ms]
+  const QUIET = 10; // time without rows after which the numbers are called old, and step in which it is told [s]
   const HEIGHT = 190; // of a chart [px]
   const UNITS = {
     _rad_s: ["rpm", 30 / Math.PI],
@@ -21,7 +22,10 @@
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   const digits = (value) => (value === null || value === undefined ? "–" : Number(value.toPrecision(4)).toString().replace("-", "−"));
   const clock = (seconds) => new Date(1000 * seconds).toLocaleString("sv"); // 2026-11-28 06:16:32, as in file names
+  const quiet = document.querySelector(".live-quiet");
   const charts = new Map();
+  let received = null; // when the latest gauges were, by this browser's clock [ms]
+  let streaming = false;
   let points = [];
   let dirty = false;
 
@@ -47,7 +51,16 @@
     return threshold ? (100 * score) / threshold : null;
   };
 
+  function showQuiet() {
+    const seconds = received === null ? 0 : QUIET * Math.floor((performance.now() - received) / (1000 * QUIET));
+    quiet.hidden = !streaming || seconds < QUIET;
+    const words = seconds < 120 ? `${seconds} s` : `${Math.round(seconds / 60)} min`;
+    const said = quiet.hidden ? "" : `No row has arrived for ${words}: the numbers below are old, and nothing is watched.`;
+    if (quiet.textContent !== said) quiet.textContent = said;
+  }
+
   function showState(one) {
+    streaming = ["learning", "watching"].includes(one.state);
     const said = one.message.startsWith(one.state) ? one.message : [one.state, one.message].filter(Boolean).join(": ");
     const raised = one.events.filter((event) => event.event === "alarm");
     const last = raised.at(-1);
@@ -79,7 +92,7 @@
     const tiles = Object.keys(point.values).map((channel) => {
       const { words, unit, factor } = unitOf(channel);
       const ends = [point.low[channel], point.high[channel]].map((one) => (one === undefined ? "–" : digits(factor * one)));
-      return tile(words, digits(point.values[channel] === null ? null : factor * point.values[channel]), unit, `last quarter second: ${ends[0]} to ${ends[1]}`);
+      return tile(words, digits(point.values[channel] === null ? null : factor * point.values[channel]), unit, `last quarter second: ${ends[0]} to ${ends[1]}${unit ? ` ${unit}` : ""}`);
     });
     for (const balance of Object.keys(point.scores)) {
       const part = share(point, balance);
@@ -144,6 +157,7 @@
   source.addEventListener("history", (event) => {
     const told = JSON.parse(event.data);
     points = told.history.filter(usable);
+    if (points.length) received = performance.now() - 1000 * Math.max(0, (told.now ?? points.at(-1).received) - points.at(-1).received);
     dirty = true;
     showState(told);
     draw();
@@ -151,6 +165,7 @@
   source.addEventListener("gauges", (event) => {
     const point = JSON.parse(event.data);
     if (!usable(point)) return;
+    received = performance.now();
     if (points.length && point.time_s < points.at(-1).time_s) points = []; // the stream began again
     points.push(point);
     if (points.length > KEPT) points.shift();
@@ -160,5 +175,8 @@
   source.addEventListener("error", () => {
     state.textContent = "The server does not answer; the view continues when it does.";
   });
-  setInterval(draw, DRAWN);
+  setInterval(() => {
+    showQuiet();
+    draw();
+  }, DRAWN);
 })();

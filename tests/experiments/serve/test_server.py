@@ -270,6 +270,26 @@ def test_many_events_scroll_in_a_box_of_limited_height(opened: Any) -> None:
     assert box.evaluate("one => one.scrollHeight > one.clientHeight")
 
 
+@pytest.mark.parametrize(
+    ("state", "age", "words"),
+    [("watching", 72.0, "No row has arrived for 70 s"), ("watching", 0.0, ""), ("failed", 72.0, "")],
+)
+def test_the_live_view_says_that_rows_have_stopped(opened: Any, state: str, age: float, words: str) -> None:
+    gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1, "received": 1.7e9}
+    channels = {"values": {"pressure_a_pa": 1.0}, "low": {"pressure_a_pa": 1.0}, "high": {"pressure_a_pa": 1.0}}
+    gauge |= {**channels, "scores": {}, "thresholds": {}}
+    told = {"name": "bench", "state": state, "message": "", "gauges": None, "history": [gauge], "events": []}
+    body = f"event: history\ndata: {json.dumps({**told, 'now': 1.7e9 + age})}\n\n"
+    page = opened("live")
+    page.route("**/events", lambda route: route.fulfill(content_type="text/event-stream", body=body))
+    page.reload()
+    page.wait_for_selector("html.live-drawn", state="attached")
+    page.wait_for_timeout(1200)
+    quiet = page.locator(".live-quiet")
+    assert quiet.is_visible() is bool(words)
+    assert quiet.inner_text().startswith(words) or not words
+
+
 def test_negative_gauges_have_a_minus_sign_and_a_balance_being_learnt_has_no_chart(opened: Any) -> None:
     gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1}
     channels = {"values": {"pressure_a_pa": -2.5e5}, "low": {"pressure_a_pa": -3e5}, "high": {"pressure_a_pa": 1e5}}
@@ -281,7 +301,7 @@ def test_negative_gauges_have_a_minus_sign_and_a_balance_being_learnt_has_no_cha
     page.reload()
     page.wait_for_selector("html.live-drawn", state="attached")
     tiles = page.locator(".gauges li").all_inner_texts()
-    assert tiles[0].split("\n") == [f"{MINUS}2.5 bar", "pressure A", f"last quarter second: {MINUS}3 to 1"]
+    assert tiles[0].split("\n") == [f"{MINUS}2.5 bar", "pressure A", f"last quarter second: {MINUS}3 to 1 bar"]
     assert [tile.split("\n")[:2] for tile in tiles[1:3]] == [
         ["learning", "flow balance: how close to an alarm"],
         ["25 %", "lost flow: how close to an alarm"],
