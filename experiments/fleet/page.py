@@ -153,25 +153,34 @@ def title_of(rows: Sequence[ActuatorRow]) -> str:
     counts = Counter(row.state for row in known)
     total = len(known) - counts["failed"]
     sick, certain = sum(counts[name] for name in SICK_STATES), counts["over"]
-    stray = sum(row.state in SICK_STATES for row in alone)
+    stray = _apart(alone)
     if not total:
         return "No log could be read."
-    if total == 1 and not stray:
-        return (
-            "The actuator nears a limit."
-            if counts["alarm"]
-            else f"The actuator is {'probably ' if sick and not certain else ''}past {'a' if sick else 'no'} limit."
-        )
+    if total == 1:
+        probably = "probably " if sick and not certain else ""
+        said = "nears a limit" if counts["alarm"] else f"is {probably}past {'a' if sick else 'no'} limit"
+        return f"The actuator {said}{stray}."
     more = [
         f", {sick - certain} more probably" if certain and sick > certain else "",
         f"; {counts['alarm']} {'nears' if counts['alarm'] == 1 else 'near'} one" if counts["alarm"] else "",
         f"; {counts['unknown']} {'has' if counts['unknown'] == 1 else 'have'} no verdict" if counts["unknown"] else "",
-        f"; {stray} of {len(alone)} logs without an actuator {'is' if stray == 1 else 'are'} past one" if stray else "",
+        stray,
     ]
     told = certain or sick
     who = f"{told} of {total} actuators {'is' if told == 1 else 'are'}" if sick else f"None of {total} actuators is"
     who += " probably" if sick and not certain else ""
     return f"{who} past a limit{''.join(more)}."
+
+
+def _apart(alone: Sequence[ActuatorRow]) -> str:
+    """Return how many logs of no known actuator are past a limit or have no verdict; empty if none."""
+    sick = sum(row.state in SICK_STATES for row in alone)
+    open_ = sum(row.state == "unknown" for row in alone)
+    if len(alone) == 1 and sick + open_:
+        return f"; the log without an actuator {'is past one' if sick else 'has no verdict'}"
+    said = [f"{sick} {'is' if sick == 1 else 'are'} past one"] if sick else []
+    said += [f"{open_} {'has' if open_ == 1 else 'have'} no verdict"] if open_ else []
+    return f"; of {len(alone)} logs without an actuator, {' and '.join(said)}" if said else ""
 
 
 def rig_hint(rows: Sequence[ActuatorRow], *, served: bool = False) -> str:

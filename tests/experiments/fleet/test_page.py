@@ -11,7 +11,7 @@ import pytest
 from experiments.fleet import page as subject
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.log_pages import file_name, write_pages
-from experiments.fleet.naming import by_pattern
+from experiments.fleet.naming import by_dates, by_pattern
 from experiments.fleet.page import fleet_page, rig_hint, row_cells, sickest_of, title_of
 from experiments.fleet.rows import STATES, log_rows
 from tests.experiments.fleet.conftest import between, store_row
@@ -318,3 +318,20 @@ def test_a_phone_shows_the_most_important_columns_and_a_wide_screen_further_ones
     page.set_viewport_size({"width": 1280, "height": 800})
     page.evaluate("new Promise(drawn => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     assert all(in_sight(page, heading) for heading in ("worst", "logs left", "last log", "logs"))
+
+
+def test_the_title_counts_logs_of_no_actuator_that_have_no_verdict() -> None:
+    def of(*alone: str) -> str:
+        files = [f"P-{i}_2026-01-0{k}.csv" for i in range(3) for k in (1, 2)]
+        more = {"unknown": {"outcome": "mismatch"}, "over": {}, "within": {}}
+        odd = [(f"odd {i}.csv", 9.0 if name == "over" else 1.0, more[name]) for i, name in enumerate(alone)]
+        rows = [store_row(file, 1.0) for file in files] + [store_row(file, one, **told) for file, one, told in odd]
+        return title_of(actuator_rows(log_rows(rows, by_dates([row["file"] for row in rows]), {})))
+
+    none = "None of 3 actuators is past a limit"
+    assert of() == of("within") == f"{none}."
+    assert of("unknown") == f"{none}; the log without an actuator has no verdict."
+    assert of("unknown", "within") == f"{none}; of 2 logs without an actuator, 1 has no verdict."
+    assert of("over", "unknown", "unknown") == (
+        f"{none}; of 3 logs without an actuator, 1 is past one and 2 have no verdict."
+    )

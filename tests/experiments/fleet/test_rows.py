@@ -95,7 +95,7 @@ def test_a_log_with_an_unreadable_date_has_its_own_row_and_keeps_its_verdict() -
     found = actuator_rows(logs)
     assert [(one.name, one.state) for one in found] == [(files[0], "over"), ("A", "within")]
     assert "must be ISO 8601 such as 2026-11-22, or a number, got '2026-99-01'" in logs[0].named.problem
-    assert title_of(found) == "None of 1 actuators is past a limit; 1 of 1 logs without an actuator is past one."
+    assert title_of(found) == "The actuator is past no limit; the log without an actuator is past one."
     page = fleet_page(found, {}, "hall")
     assert "Logs without a usable date" in page
     assert "could not be read" not in page
