@@ -249,12 +249,13 @@ def _continuous(
     delay: int,
     input_name: str,
     output_name: str,
+    covariance: CovarianceKind,
     **_: Any,
 ) -> LinearModel:
     """Fit a strictly proper model. With a held input, its output responds one sample late even without dead time."""
-    names = {"input_name": input_name, "output_name": output_name}
+    about: dict[str, Any] = {"input_name": input_name, "output_name": output_name, "covariance": covariance}
     late, n = max(delay - 1, 0) * sample_time, n_denominator
-    return fit_continuous(u, y, sample_time, n_zeros=n - 1, n_poles=n, dead_time=late, **names)
+    return fit_continuous(u, y, sample_time, n_zeros=n - 1, n_poles=n, dead_time=late, **about)
 
 
 _FITS: dict[str, Callable[..., LinearModel]] = {

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import quality
+from estimation.identification.fit.fitted import CovarianceKind, is_robust, quality
 from estimation.identification.fit.output_error import descend_from, jacobian_and_residual, minimise
 from estimation.identification.model.held_input import held_input_model
 from estimation.identification.model.linear_model import LinearModel
@@ -42,6 +42,7 @@ def fit_continuous(
     n_zeros: int,
     n_poles: int,
     dead_time: float | None = 0.0,
+    covariance: CovarianceKind = "white",
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
@@ -57,6 +58,8 @@ def fit_continuous(
         Degrees of numerator and denominator, ``n_zeros <= n_poles``.
     dead_time : float or None
         Known delay of the input [s]; None estimates it, ten samples at most.
+    covariance : {"white", "coloured", "auto"}
+        As `fit_output_error`; the deviation of the dead time is from the same one.
 
     Returns
     -------
@@ -77,7 +80,7 @@ def fit_continuous(
     early = problem.without_whole_samples()
     found = [early.descend(start) for start in early.starts()]
     values = min(found, key=lambda one: one[0])[1]
-    return problem.result(values, data_hash(given, sample_time), names)
+    return problem.result(values, data_hash(given, sample_time), names, covariance)
 
 
 class _ModelAtPoint(NamedTuple):
@@ -211,18 +214,23 @@ class _Problem:
         values = np.asarray(np.concatenate([numerator, a[1:]]), dtype=np.float64)
         return values if self.dead_time is not None else np.concatenate([values, [late]])
 
-    def result(self, values: Array, fingerprint: str, names: tuple[str, str]) -> LinearModel:
+    def result(
+        self, values: Array, fingerprint: str, names: tuple[str, str], covariance: CovarianceKind
+    ) -> LinearModel:
         """Return the model in seconds and in the data's units."""
         T, n_b = self.sample_time, self.n_zeros + 1
         jacobian, residual = self.parts(values)
         white, robust, _ = covariances(jacobian, residual, self.data)
+        taken = robust if is_robust(covariance, residual, self.data) else white
         # values are in samples: a coefficient of s^k is multiplied by T^k, relative to the leading 1 of s^n
         powers_b = np.arange(self.n_zeros, -1, -1)
         powers_a = np.arange(self.n_poles - 1, -1, -1)
         gain = self.data.y_scale / self.data.u_scale
         unscale = np.concatenate([T ** (powers_b - self.n_poles) * gain, T ** (powers_a - self.n_poles)])
         n_main = unscale.size
-        white_main, robust = (one[:n_main, :n_main] * np.outer(unscale, unscale) for one in (white, robust))
+        main, white_main, robust_main = (
+            one[:n_main, :n_main] * np.outer(unscale, unscale) for one in (taken, white, robust)
+        )
         late = self.dead_time if self.dead_time is not None else float(values[-1]) * T
         return LinearModel(
             numerator=values[:n_b] * unscale[:n_b],
@@ -230,13 +238,13 @@ class _Problem:
             sample_time=T,
             input_name=names[0],
             output_name=names[1],
-            covariance=white_main,
+            covariance=main,
             covariance_white=white_main,
-            covariance_robust=robust,
+            covariance_robust=robust_main,
             data_hash=fingerprint,
             **quality(residual, self.data, jacobian.shape[1]),
             structure="continuous-output-error",
             continuous=True,
             dead_time=late,
-            dead_time_std=float(np.sqrt(white[n_main, n_main])) * T if self.dead_time is None else float("nan"),
+            dead_time_std=float(np.sqrt(taken[n_main, n_main])) * T if self.dead_time is None else float("nan"),
         )

@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.residual_tests import ljung_box
+from estimation.identification.fit.covariances import covariances, is_coloured
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
 from estimation.identification.notes import IdentificationCode
@@ -24,9 +23,6 @@ from estimation.notes import EstimateCode
 from plant.errors import CovarianceWarning, HydrostateError, LogWarning
 
 CovarianceKind = Literal["white", "coloured", "auto"]
-
-COLOURED_P_VALUE = 1e-3
-"""p-value of the whiteness test below which ``covariance="auto"`` takes the robust covariance."""
 
 
 class NoEffectError(HydrostateError):
@@ -117,9 +113,7 @@ class Task:
         unscale = np.concatenate([np.full(form.n_numerator, gain), np.ones(form.n_denominator)])
         *spreads, determined = covariances(jacobian, residual, data)
         white, robust = (spread[:n_main, :n_main] * np.outer(unscale, unscale) for spread in spreads)
-        coloured = self.covariance == "coloured"
-        if self.covariance == "auto":
-            coloured = ljung_box(np.where(data.used, residual, np.nan)).p_value < COLOURED_P_VALUE
+        coloured = is_robust(self.covariance, residual, data)
         found = quality(residual, data, jacobian.shape[1])
         if noise is None:
             _require_effect(float(residual @ residual), float(data.y @ data.y), data.n_used, n_main, self.names)
@@ -145,6 +139,21 @@ class Task:
         )
         _warn(model, determined)
         return model
+
+
+def is_robust(covariance: CovarianceKind, residual: Array, data: Experiments) -> bool:
+    """Return whether deviations are from the robust covariance.
+
+    Parameters
+    ----------
+    covariance : {"white", "coloured", "auto"}
+        What was asked for; with ``"auto"`` the residual decides.
+    residual : ndarray, shape (n,)
+        Not read where the output is missing.
+    """
+    if covariance == "auto":
+        return is_coloured(residual, data.used)
+    return covariance == "coloured"
 
 
 def quality(residual: Array, data: Experiments, n_parameters: int) -> dict[str, Any]:

@@ -1,18 +1,21 @@
 """Output error of a linear model behind an input nonlinearity (Hammerstein): all values at once, exact derivatives."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
+from estimation.identification.fit.covariances import spread_of_fit
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.input_nonlinearity import NONLINEARITIES
 from estimation.identification.free_run.linear_fit import COARSE, fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows, settles
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
 from estimation.identification.search.levenberg import levenberg
+from estimation.notes import EstimateCode
+from plant.errors import LogWarning
 
 TOLERANCE, MOST_STEPS = 1e-9, 60
 """Relative gain of the cost below which a descent ends, and most evaluations."""
@@ -247,14 +250,9 @@ def deviations(fit: HammersteinFit, data: Channels) -> Array:
     problem = HammersteinProblem(fit.kind, fit.linear.form, data)
     output, jacobian = problem.jacobian(fit.theta)
     residual = np.where(problem.used, output - problem.target, 0.0)
-    jacobian[~problem.used] = 0.0
-    felt = np.flatnonzero(np.any(jacobian != 0.0, axis=0))
-    used = int(np.count_nonzero(problem.used))
-    spread = least_squares_covariance(
-        np.ascontiguousarray(jacobian[:, felt]), residual, used, automatic_lags(residual), np.zeros(len(felt))
-    )[1]
-    found = np.full(fit.theta.size, np.inf)
-    variance = np.diag(spread)
-    # if the residual is as slow as the log, the windowed estimate may not be positive: nothing is then known
-    found[felt] = np.sqrt(np.where(variance > 0.0, variance, np.inf))
-    return found[: problem.n_static]
+    bounds = np.concatenate([[0], np.cumsum([y.size for y in data.y])]).astype(np.int64)
+    spread = spread_of_fit(jacobian, residual, problem.used, bounds)
+    if not spread.determined:
+        warnings.warn(LogWarning(EstimateCode.NOT_DETERMINED.note()), stacklevel=2)
+    variance = np.diag(spread.taken)[: problem.n_static]
+    return np.sqrt(np.where(variance > 0.0, variance, np.inf))

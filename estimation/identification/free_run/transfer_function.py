@@ -3,9 +3,7 @@
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import COLOURED_P_VALUE
-from estimation.identification.fit.residual_tests import DEFAULT_LAGS, ljung_box
+from estimation.identification.fit.covariances import Spread, spread_of_fit
 from estimation.identification.fit.validate import estimate_initial_state
 from estimation.identification.free_run.data import Channels, Scaling
 from estimation.identification.free_run.linear_problem import LinearFit, Problem
@@ -24,11 +22,14 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
         The scaling.
     """
     form, problem = fit.form, Problem(fit.form, data)
-    output, residual, spreads, coloured = _residual_and_covariances(fit, problem)
+    output, residual, found_spread = _residual_and_spread(fit, problem)
     used = problem.used
     n_main, gain = form.n_b + form.order, by.y_std / float(by.u_std[0])
     unscale = np.concatenate([np.full(form.n_b, gain), np.ones(form.order)])
-    white, robust = (spread * np.outer(unscale, unscale) for spread in spreads)
+    white, robust, taken = (
+        one[:n_main, :n_main] * np.outer(unscale, unscale)
+        for one in (found_spread.white, found_spread.robust, found_spread.taken)
+    )
     b = fit.theta[: form.n_b] * gain
     level = by.y_mean + by.y_std * float(fit.theta[n_main])
     rss, n_used = float(residual @ residual) * by.y_std**2, int(np.count_nonzero(used))
@@ -41,7 +42,7 @@ def linear_model(fit: LinearFit, data: Channels, by: Scaling) -> LinearModel:
         input_name=data.inputs[0],
         output_name=data.output,
         delay=form.delays[0],
-        covariance=robust if coloured else white,
+        covariance=taken,
         covariance_white=white,
         covariance_robust=robust,
         fit_percent=100.0 * (1.0 - float(np.sqrt(rss / deviation))),
@@ -71,28 +72,24 @@ def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float,
         One per input [output unit / input unit].
     """
     form, total = fit.form, float(fit.f.sum())
-    _, _, (white, robust), coloured = _residual_and_covariances(fit, Problem(form, data))
+    n_main = form.n_b + form.order
+    spread = _residual_and_spread(fit, Problem(form, data))[2].taken[:n_main, :n_main]
     ends = np.cumsum([0, *form.sizes])
     deviations = list[float]()
     for k, b in enumerate(fit.numerators):
-        slope = np.zeros(form.n_b + form.order)
+        slope = np.zeros(n_main)
         slope[ends[k] : ends[k + 1]] = 1.0 / total
         slope[form.n_b :] = -float(b.sum()) / total**2
-        variance = float(slope @ (robust if coloured else white) @ slope)
+        variance = float(slope @ spread @ slope)
         deviations.append(float(np.sqrt(variance)) * by.y_std / float(by.u_std[k]))
     return tuple(deviations)
 
 
-def _residual_and_covariances(fit: LinearFit, problem: Problem) -> tuple[Array, Array, tuple[Array, Array], bool]:
-    """Return output, residual, both covariances of numerators and denominator, and whether the residual is coloured."""
+def _residual_and_spread(fit: LinearFit, problem: Problem) -> tuple[Array, Array, Spread]:
+    """Return output, residual, and the covariances of all values."""
     output, jacobian = problem.jacobian(fit.theta)
-    used, data, n_main = problem.used, problem.data, fit.form.n_b + fit.form.order
-    residual = np.where(used, problem.y - output, 0.0)
-    jacobian[~used] = 0.0
-    white, robust, _ = covariances(jacobian, residual, _experiments(data, problem))
-    lags = DEFAULT_LAGS if data.n_samples > DEFAULT_LAGS else data.n_samples // 2
-    coloured = ljung_box(np.where(used, residual, np.nan), n_lags=lags).p_value < COLOURED_P_VALUE
-    return output, residual, (white[:n_main, :n_main], robust[:n_main, :n_main]), coloured
+    residual = np.where(problem.used, problem.y - output, 0.0)
+    return output, residual, spread_of_fit(jacobian, residual, problem.used, problem.bounds.astype(np.int64))
 
 
 def _with_initial_state(model: LinearModel, simulated: Array, u: Array, by: Scaling) -> LinearModel:

@@ -5,10 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.covariances import covariances
-from estimation.identification.fit.fitted import COLOURED_P_VALUE
-from estimation.identification.fit.residual_tests import ljung_box
-from estimation.identification.search.experiments import Experiments
+from estimation.identification.fit.covariances import spread_of_fit
 from estimation.identification.search.levenberg import levenberg
 from estimation.identification.state_space.joint import Joint
 from estimation.identification.state_space.problem import Problem, Size, Values
@@ -203,12 +200,9 @@ def system_of(fit: StateSpaceFit, data: Joint, delays: tuple[int, ...]) -> State
     used = problem.used.T
     left, columns = _whitened(problem, fit.theta, basis, _whitener(problem, fit.noise))
     bounds = [0, *(part.stop + o * len(problem.u) for o in range(fit.size.p) for part in data.slices)]
-    flat = Experiments(np.zeros(left.size), left.ravel(), used.ravel(), np.array(bounds, dtype=np.int64))
-    plain, robust, _ = covariances(columns.reshape(left.size, -1), left.ravel(), flat)
-    coloured = any(
-        ljung_box(np.where(there, one, np.nan)).p_value < COLOURED_P_VALUE
-        for one, there in zip(left, used, strict=True)
+    found = spread_of_fit(
+        columns.reshape(left.size, -1), left.ravel(), used.ravel(), np.array(bounds, dtype=np.int64), fit.size.p
     )
     k = fit.size.n_matrices
-    spread = (basis @ (robust if coloured else plain) @ basis.T)[:k, :k]
+    spread = (basis @ found.taken @ basis.T)[:k, :k]
     return StateSpace(v.a, v.b, v.c, v.d, v.level, delays, fit.size.direct, data.sample_time, spread)

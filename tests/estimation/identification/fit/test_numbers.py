@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.fit import continuous, fitted, instrumental, output_error, profile_interval
+from estimation.identification.fit import continuous, covariances, instrumental, output_error, profile_interval
 from estimation.identification.fit.arx import fit_arx
 from estimation.identification.fit.continuous import fit_continuous
 from estimation.identification.fit.fitted import Task, _require_effect, quality
@@ -98,7 +98,7 @@ def fits_of_every_structure() -> dict[str, Any]:
     told["coloured is asked"] = told_of(fit_output_error(u, y, 0.01, **FORM, covariance="coloured"))["covariance"]
     for probability in (0.9e-3, 1.1e-3, 1.9e-3):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(fitted, "ljung_box", lambda _, p=probability: ResidualTest(1.0, 1, p))
+            patch.setattr(covariances, "ljung_box", lambda _, n_lags, p=probability: ResidualTest(1.0, n_lags, p))
             model = fit_output_error(u, y, 0.01, **FORM, covariance="auto")
         told[f"coloured with a probability of {probability:g}"] = told_of(model)["covariance"]
     told["white is asked"] = told_of(fit_output_error(u, y, 0.01, **FORM))["covariance"]

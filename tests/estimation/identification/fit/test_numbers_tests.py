@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation.identification.fit import covariances as covariance_module
 from estimation.identification.fit import order
 from estimation.identification.fit.covariances import covariances
 from estimation.identification.fit.feedback import FEEDBACK_SAMPLES, feedback_note
 from estimation.identification.fit.inverse_dynamics import fit_rigid_body, force_error
 from estimation.identification.fit.output_error import fit_output_error
+from estimation.identification.fit.residual_noise import noise_seen, noise_spectrum
 from estimation.identification.fit.residual_tests import (
     ResidualTest,
     correlations,
@@ -116,10 +116,9 @@ def covariances_of_residuals() -> dict[str, Any]:
         white, robust, determined = covariances(one, residual, data)
         told[name] = [white, robust, determined]
     for n in (9, 10, 19, 20, 64, 128, 129):
-        row = columns[:n, :2]
-        told[f"meat of {n}"] = covariance_module._coloured_meat(row, residual[:n], int(used[:n].sum()))
-    long = np.resize(columns[:, :2], (4000, 2))
-    told["meat of a long record"] = covariance_module._coloured_meat(long, np.resize(residual, 4000), 4000)
+        upright = np.linalg.qr(columns[:n, :2])[0]
+        found = noise_spectrum([(residual[:n], upright, used[:n])])
+        told[f"noise of {n}"] = [found.coefficients, found.variance, noise_seen(found, upright)]
     return told
 
 
