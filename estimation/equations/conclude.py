@@ -13,7 +13,7 @@ from estimation.equations.problem import Problem, spread
 from estimation.equations.search import LARGEST_SHIFT, MOST_STEPS, Solution, noise_of
 from estimation.equations.stops import standing_ends
 from estimation.finding import Finding, Gate, Outcome, Quantity
-from estimation.fits.greybox.covariance import automatic_lags, least_squares_covariance
+from estimation.identification.fit.covariances import spread_of_fit
 from estimation.identification.fit.residual_tests import cross_correlation_test
 from plant.errors import HydrostateError
 from plant.notes import Note
@@ -101,10 +101,8 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
     ]
     order = qr(slopes[:, felt] / size[felt], mode="r", pivoting=True)[1][: int(np.count_nonzero(~lost))]
     kept = felt[np.sort(order)]
-    used = int(np.count_nonzero(np.concatenate([~np.isnan(part.measured).ravel() for part in problem.parts])))
     std, correlation = np.full(len(theta), np.inf), np.full((len(theta), len(theta)), np.nan)
-    lags = automatic_lags(errors)
-    spread_of = least_squares_covariance(slopes[:, kept], errors, used, lags, np.zeros(len(kept)))[1]
+    spread_of = _spread(problem, slopes[:, kept], errors)
     variance = np.diag(spread_of)
     known = np.sqrt(np.where(variance > 0.0, variance, np.inf))
     std[kept] = known
@@ -113,6 +111,19 @@ def covariance_of(problem: Problem, theta: Array) -> Covariance:
     correlation[touched] = correlation[:, touched] = np.nan
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 and not len(touched) else np.inf
     return Covariance(std, correlation, condition, tuple(dict.fromkeys(groups)))
+
+
+def _spread(problem: Problem, slopes: Array, errors: Array) -> Array:
+    """Return the covariance of unknowns that the logs tell apart; the noise of each output has a colour of its own."""
+    sizes = [part.measured.shape[1] for part in problem.parts for _ in part.measured]
+    begins = np.concatenate([[0], np.cumsum(sizes)])
+    outputs = len(problem.parts[0].measured)
+    # rows are laid log by log, and output by output within a log
+    blocks = [k * outputs + output for output in range(outputs) for k in range(len(problem.parts))]
+    order = np.concatenate([np.arange(begins[k], begins[k + 1]) for k in blocks])
+    used = np.concatenate([np.isfinite(part.measured).ravel() for part in problem.parts])[order]
+    bounds = np.concatenate([[0], np.cumsum([sizes[k] for k in blocks])]).astype(np.int64)
+    return spread_of_fit(slopes[order], np.where(used, errors[order], 0.0), used, bounds, outputs).taken
 
 
 def concluded_finding(solution: Solution, given: Array) -> tuple[Finding, Covariance]:

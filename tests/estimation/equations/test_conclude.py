@@ -187,8 +187,9 @@ def test_the_search_of_initial_states_takes_at_most_ten_steps() -> None:
 
 def linear(slopes: np.ndarray) -> Any:
     """Return a problem whose residuals are white and whose sensitivities are given."""
-    errors = 0.1 * np.tile([1.0, 1.0, -1.0, -1.0], len(slopes) // 4)  # neighbours are uncorrelated
-    part = SimpleNamespace(measured=np.zeros(len(slopes)))
+    errors = np.random.default_rng(9).standard_normal(len(slopes))
+    errors *= 0.1 / np.sqrt(np.mean(errors**2))
+    part = SimpleNamespace(measured=np.zeros((1, len(slopes))))
     return SimpleNamespace(slopes=lambda _: slopes, residuals=lambda _: [errors], parts=[part])
 
 
