@@ -113,7 +113,7 @@ def test_missing_samples_and_a_drop_out_do_not_move_it() -> None:
 
 def test_a_log_without_position_is_refused_by_name() -> None:
     record, _ = run("normal")
-    with pytest.raises(LogError, match="lacks position_m"):
+    with pytest.raises(LogError, match="the log has no position_m"):
         filter_flow(record.replace(position_m=None), HEALTHY)
 
 

@@ -148,7 +148,7 @@ def test_an_offset_of_pressure_does_not_pass_for_one_of_speed(monkeypatch: pytes
 
 
 def test_a_log_without_pressure_is_refused_and_the_missing_channel_named() -> None:
-    with pytest.raises(LogError, match="lacks differential_pressure_pa"):
+    with pytest.raises(LogError, match="the log has no differential_pressure_pa"):
         fit_flow(log("normal", 13).replace(differential_pressure_pa=None), HEALTHY, 2e8)
 
 
