@@ -268,7 +268,7 @@ def test_an_error_model_is_reported_saved_and_simulated(tmp_path: Path) -> None:
     saved, columns = tmp_path / "model.json", ("--input", "u", "--output", "y")
     said = run(tmp_path / "product.csv", *columns, "--structure", "auto", "--out", saved).stdout
     assert "error model" in said
-    assert "a polynomial of inputs and free run" in " ".join(said.split())
+    assert "can be predicted by a polynomial of its free run and the inputs" in " ".join(said.split())
     (one,) = json.loads(saved.read_text())
     assert set(one["error_model"]) == {"degree", "lags_samples", "n_values"}
     assert "with an error model" in one["message"]
