@@ -52,6 +52,10 @@ class LogCode(Code):
         "taken as evenly spaced"
     )
     TIME_IS_DATES = "column {column!r} has no unit; it was read in {unit}, so the log begins at {began}"
+    SCALE_IN_HEADER = (
+        "the file states the scale factor {factor:g} and the offset {offset:g} for column {column!r}, but not whether "
+        "its values are scaled already: check them; a unit such as '{factor:g} bar' scales them"
+    )
     TIME_RAN_OVER = (
         "{channel} falls back by {span_s:.10g} s, like a counter that overflows (places: {count}, the first at row "
         "{row}); the rows were read as one log"

@@ -53,6 +53,11 @@ def _twincat(rows: Rows, by: str) -> Laid:
     ]
 
 
+def _pairs(rows: Rows, by: str) -> Laid:
+    head = by.join(x for one in BRACKETED[1:] for x in (BRACKETED[0], one))
+    return [head], [by.join(x for v in one[1:] for x in (one[0], v)) for one in rows]
+
+
 def _plain(rows: Rows, by: str, *above: Sequence[str]) -> Laid:
     return [by.join(one) for one in above], [by.join(one) for one in rows]
 
@@ -64,6 +69,10 @@ LAYOUTS: Mapping[str, Callable[[Rows, str], Laid]] = {
     "PicoScope": lambda rows, by: _plain(rows, by, NAMES, [f"({unit})" for unit in UNITS], [""]),
     "ETAS": lambda rows, by: _plain(rows, by, ["ETASAsciiItemFile record 0 0"], NAMES, UNITS, ["f8"] * 5),
     "a title": lambda rows, by: _plain(rows, by, ["Bench 2"], ["Operator", "7"], [""], NAMES, UNITS),
+    "Excel": lambda rows, by: _plain(
+        rows, by, ["Bench 2", *[""] * 4], ["Rate", "1000", *[""] * 3], [""] * 5, BRACKETED
+    ),
+    "a clock for each": lambda rows, by: _pairs(rows, by),
     "LabVIEW": _labview,
     "TwinCAT Scope": _twincat,
 }

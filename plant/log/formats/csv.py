@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
@@ -12,14 +13,16 @@ import pyarrow as pa
 from pyarrow import csv as arrow_csv
 
 from plant.arrays import Array
+from plant.errors import LogWarning
 from plant.log.clock.stamps import read_stamps
-from plant.log.columns import TIME, Column
+from plant.log.columns import TIME, TRUTH_PREFIX, Column
 from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
 from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
 from plant.log.formats.packed import open_unpacked, packing_of
 from plant.log.formats.thousands import may_group_thousands, require_none_grouped
+from plant.log.notes import LogCode
 from plant.log.table import Table
 
 _BLOCK = 1 << 20
@@ -57,6 +60,10 @@ def _read(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, 
         with suppress(pa.ArrowInvalid, UnicodeError, _NotFastError):
             found = _read_fast(path, layout, chosen)
     found = _read_cells(path, layout, chosen) if found is None else found
+    for column in (one for one in chosen if one.position in layout.scales and not one.channel.startswith(TRUTH_PREFIX)):
+        factor, offset = layout.scales[column.position]
+        note = LogCode.SCALE_IN_HEADER.note(column=column.name[:60], factor=factor, offset=offset)
+        warnings.warn(LogWarning(note, str(path)), stacklevel=2)
     for column, values in found.items():
         if column.channel != TIME and column.position not in layout.stamped and may_group_thousands(values):
             require_none_grouped(_texts(path, layout, column), column.name, str(path))

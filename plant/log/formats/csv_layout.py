@@ -77,6 +77,8 @@ class Layout:
         Time between rows [s], where the lines above give it in place of a column.
     in_cells : Mapping[int, str]
         Units that stand behind each number of a column, by its place.
+    scales : Mapping[int, tuple[float, float]]
+        Scale factor and offset that the file states for a column, by its place; applied or not.
     """
 
     headings: tuple[Heading, ...]
@@ -87,6 +89,7 @@ class Layout:
     stamped: frozenset[int] = frozenset()
     step: float | None = None
     in_cells: Mapping[int, str] = field(default_factory=dict[int, str])
+    scales: Mapping[int, tuple[float, float]] = field(default_factory=dict[int, tuple[float, float]])
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:

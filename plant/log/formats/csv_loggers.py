@@ -1,8 +1,9 @@
 """Headers that some programs write above the rows of a text log: units, the time step, a clock for each channel."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from plant.log.headings import Heading, is_unit, unit_or_none
@@ -14,6 +15,9 @@ LABVIEW, HEADER_ENDS = "LabVIEW Measurement", "***End_of_Header***"
 
 TWINCAT_STEP = "SampleTime[ms]"
 """How TwinCAT Scope says the sample time of each channel."""
+
+_SCALE_ROWS = ("scalefactor", "offset")
+"""How it says the scale of each channel, which its export applies or not, and does not say."""
 
 
 def without_remarks(lines: Sequence[str]) -> list[str]:
@@ -97,4 +101,18 @@ def with_twincat_clock(layout: "Layout", above: Sequence[list[str]], rows: Seque
     for place in clocks:
         beside = "".join(names[place + 1 : place + 2]).strip()
         headings[place] = Heading("Time", "ms") if place == clocks[0] else Heading(f"Time of {beside}")
-    return replace(layout, headings=tuple(headings))
+    return replace(layout, headings=tuple(headings), scales=_stated_scales(said))
+
+
+def _stated_scales(said: Mapping[str, Sequence[str]]) -> dict[int, tuple[float, float]]:
+    """Return the scale factors and offsets that differ from 1 and 0, by the place of their column."""
+    factors, offsets = (next((row for key, row in said.items() if key.lower() == name), ()) for name in _SCALE_ROWS)
+    found: dict[int, tuple[float, float]] = {}
+    for place, texts in enumerate(zip_longest(factors, offsets, fillvalue="")):
+        try:
+            factor, offset = (float(one.replace(",", ".") or neutral) for one, neutral in zip(texts, "10", strict=True))
+        except ValueError:
+            continue
+        if (factor, offset) != (1.0, 0.0):
+            found[place] = factor, offset
+    return found

@@ -246,3 +246,12 @@ def test_one_line_of_text_below_a_short_log_is_left_out_and_more_are_refused(end
     assert (len(record), notes) == (40, [LogCode.END_LEFT_OUT.note(count=1, taken=40)])
     with pytest.raises(LogError, match="row 41"):
         read(written(tmp_path, *ROWS[:40], end, end, *["END"] * (end != "END")))
+
+
+def test_a_channel_whose_file_states_a_scale_is_read_with_a_warning(tmp_path: Path) -> None:
+    above = ["Name;Speed;Way", "SampleTime[ms];1;1", "ScaleFactor;1;0,1", "Unit;rpm;mm", ""]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([*above, *(f"{k};{100 * k % 700},5;{k % 9}" for k in range(50))]))
+    columns = {"motor_speed_rad_s": "Speed", "position_m": "Way"}
+    with pytest.warns(LogWarning, match="the scale factor 0.1 and the offset 0 for column 'Way'"):
+        read_record(path, columns=columns)

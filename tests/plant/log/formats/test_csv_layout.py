@@ -148,6 +148,13 @@ def test_a_twincat_scope_log_has_one_clock_in_milliseconds_if_all_its_channels_s
         assert scope("2", hostile).headings
 
 
+def test_a_scale_that_a_twincat_header_states_is_kept_with_its_column() -> None:
+    rows = [f"{2 * k}\t1,{k}\t{2 * k}\t3,{k}" for k in range(5)]
+    stated = "ScaleFactor\t1\tScaleFactor\t0,5", "Offset\t0\tOffset\t2"
+    assert scope("2", rows, *stated).scales == {3: (0.5, 2.0)}
+    assert scope("2", rows, "ScaleFactor\t1\tScaleFactor\t1", "Offset\t\tOffset\tx").scales == {}
+
+
 def test_twincat_channels_with_one_shared_time_column_have_a_clock_in_milliseconds() -> None:
     made = layout(
         "Name\tProject",
