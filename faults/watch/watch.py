@@ -13,7 +13,7 @@ of k peaks is ``k (1 + h / (k s))^-k`` (a Pareto predictive law), which is set t
 """
 
 from collections.abc import Mapping
-from math import exp, isfinite
+from math import exp
 
 import numpy as np
 
@@ -73,11 +73,8 @@ SETTLE = 10.0
 LEARNING = 120.0
 """Healthy running before alarms can be raised [s]."""
 
-LEAST_LEARNING = 60.0
-"""Shortest healthy running that can be set before alarms [s]."""
-
-MOST_LEARNING = 1e7
-"""Longest such running: four months; judged [s]."""
+LEAST_LEARNING, MOST_LEARNING = 60.0, 1e7
+"""Shortest and longest healthy running that can be set before alarms; judged [s]."""
 
 AFTER = 2.0
 """Running time after an alarm from which the change of the gains is determined [s]."""
@@ -126,11 +123,10 @@ class Watch:
     ) -> None:
         if not 0.0 < sample_time <= SLOWEST:
             raise HydrostateError(f"a watch needs a sample at least every {SLOWEST:g} s, got one in {sample_time:g} s")
-        if not (isfinite(false_alarms) and 0.0 < false_alarms <= 60.0):
+        if not 0.0 < false_alarms <= 60.0:
             raise HydrostateError(f"false alarms must be over 0 and at most 60 an hour, got {false_alarms:g}")
         if not LEAST_LEARNING <= learning <= MOST_LEARNING:
-            allowed = f"at least {LEAST_LEARNING:g} s and at most {MOST_LEARNING:g} s"
-            raise HydrostateError(f"learning must take {allowed}, got {learning:g} s")
+            raise HydrostateError(f"learning must take {LEAST_LEARNING:g} to {MOST_LEARNING:g} s, got {learning:g} s")
         balances = BALANCES if pressure else ("motion",)
         self.pressure, self.balances = pressure, (*balances, LOSS_BALANCE)
         self.sample_time, self.start = sample_time, start

@@ -78,7 +78,7 @@ class Layout:
     in_cells : Mapping[int, str]
         Units that stand behind each number of a column, by its place.
     scales : Mapping[int, tuple[float, float]]
-        Scale factor and offset that the file states for a column, by its place; applied or not.
+        Scale factor [1] and offset [unit of the column] that the file states, by the column's place; applied or not.
     """
 
     headings: tuple[Heading, ...]
