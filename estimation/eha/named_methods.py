@@ -9,21 +9,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from estimation.models.eha_forms import ACCELERATION_FORM
-
-PUBLISHED_TIME = 1e-4
-"""Sample time of section 7, for which equation 7.6 is printed [s]."""
-
-PRINTED_Q = (1e-12, 1e-8, 1e-6, 1e-12)
-"""Equation 7.6: variance added per step to position [m^2], velocity [m^2/s^2], acceleration [m^2/s^4] and bulk modulus
-[Pa^2]."""
-
-PRINTED_R: Mapping[str, float] = MappingProxyType({"position_m": 1e-12, "velocity_m_s": 1e-4})
-"""Equation 7.7: measurement variances [m^2, m^2/s^2]."""
-
-PRINTED_NOISE: Mapping[str, float] = MappingProxyType(
-    {state.name: q / PUBLISHED_TIME for state, q in zip(ACCELERATION_FORM.states, PRINTED_Q, strict=True)}
-)
-"""Equation 7.6 as densities [SI squared a second]."""
+from estimation.models.published_noise import PRINTED_NOISE, PRINTED_R
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from estimation.filters.run import filter_problem
 from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.gaussian import Gaussian
 from estimation.models.model import ProcessModel
+from estimation.models.published_noise import PRINTED_NOISE, PRINTED_R
 from estimation.trust.whiteness import quantum
 from estimation.tuning.scoring import Coordinate, Maximum, maximise
 from estimation.tuning.sensitivity import Sensitivity, innovation_sensitivity
@@ -30,20 +31,6 @@ NOISE_SPREAD = 3.0
 
 LEAST_SHARE = 0.25
 """Least share of the noise of measured motor speed that is attributed to the sensor, and does not act on the plant."""
-
-PUBLISHED_STEP = 1e-4
-"""Step for which equation 7.6 gives covariances [s]."""
-
-PUBLISHED_NOISE: Mapping[str, float] = {
-    "position_m": 1e-12 / PUBLISHED_STEP,
-    "velocity_m_s": 1e-8 / PUBLISHED_STEP,
-    "acceleration_m_s2": 1e-6 / PUBLISHED_STEP,
-    "bulk_modulus_pa": 1e-12 / PUBLISHED_STEP,
-}
-"""Q of equation 7.6 as densities, by state name [SI squared per second]; far too small on bulk modulus (errata E10)."""
-
-PUBLISHED_VARIANCES: Mapping[str, float] = {"position_m": 1e-12, "velocity_m_s": 1e-4}
-"""R of equation 7.7, by channel [SI squared] (errata E11)."""
 
 SCREENED_FACTORS = ((1e3, 1.0), (1.0, 1.0), (1e-1, 1.0), (1e-2, 1.0), (1e-3, 1.0), (1.0, 1e-2), (1e-3, 1e-2))
 """Factors on all process noise and on all sensor noise from which the search's start is chosen, in this order."""
@@ -262,9 +249,9 @@ def _innovations(problem: FilterProblem) -> Sensitivity:
 def _task_with_published_noise(problem: FilterProblem) -> FilterProblem:
     noise = problem.noise.copy()
     for i, state in enumerate(problem.model.states):
-        if state.name in PUBLISHED_NOISE and not state.logarithmic:
-            noise[i] = PUBLISHED_NOISE[state.name] / state.scale**2
-    sensors = [PUBLISHED_VARIANCES.get(name, problem.variances[c]) for c, name in enumerate(problem.channels)]
+        if state.name in PRINTED_NOISE and not state.logarithmic:
+            noise[i] = PRINTED_NOISE[state.name] / state.scale**2
+    sensors = [PRINTED_R.get(name, problem.variances[c]) for c, name in enumerate(problem.channels)]
     return replace(problem, noise=noise, variances=np.array(sensors))
 
 

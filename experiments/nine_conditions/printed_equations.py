@@ -6,11 +6,12 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from estimation.eha.named_methods import NAMED, PUBLISHED_TIME
+from estimation.eha.named_methods import NAMED
 from estimation.filters.methods import METHODS
 from estimation.filters.run import run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.eha_forms import BULK_MODULUS, PRINTED_FORM
+from estimation.models.published_noise import PUBLISHED_TIME
 from experiments.nine_conditions.bulk_modulus import PUBLISHED_METHOD
 from experiments.nine_conditions.settings import StudySettings
 from experiments.running.executors import map_in_parallel

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 from scipy.constants import psi
 
-from estimation.eha.named_methods import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
 from estimation.finding import NORMAL_95, interval_95
 from estimation.identification.signals.preprocess import zero_phase_filter
+from estimation.models.published_noise import PRINTED_Q, PRINTED_R, PUBLISHED_TIME
 from experiments.circuit.first_tests import UNCERTAIN_BREAK_ROWS
 from experiments.circuit.steady_experiments import FIGURE_9_VOLTS
 from experiments.nine_conditions.bulk_modulus import (

@@ -10,14 +10,12 @@ from estimation.arrays import Array, IntArray
 from estimation.fits.greybox.descent import Point
 from estimation.fits.greybox.kernel import Kernel, compile_kernel
 from estimation.fits.greybox.log import GreyBoxLog
+from estimation.fits.greybox.loops import STRAIGHT
 from estimation.fits.greybox.normal_loops import fill_quadratic
 from estimation.models.greybox import GreyBoxModel
 
 OUTLIER = 3.0
 """Residuals beyond this many standard deviations count linearly (Huber 1964) [dimensionless]."""
-
-STRAIGHT = 1e-3
-"""Weight in ``J'J`` of a residual that counts linearly, as in the kernel [dimensionless]."""
 
 UPWARD, DOWNWARD = np.log(1e3), 70.0
 """How far the logarithm of an unknown may leave its starts: three decades up; down until it is as good as absent."""

@@ -27,7 +27,7 @@ from faults.diagnosis.circuits.class_regions import ClassFits, fit_classes
 from faults.diagnosis.circuits.model_doubt import lasting_misfit
 from faults.diagnosis.circuits.out_of_model import unexplained_notes
 from faults.notes import AgainstCode
-from faults.watch.events import LOSS_BALANCE, Alarm
+from faults.watch.events import INTERVAL_DROP, LOSS_BALANCE, Alarm
 from faults.watch.watch import LEAST_LEARNING, SLOWEST, watch_record
 from plant.arrays import Array
 from plant.log.record import Record
@@ -46,9 +46,6 @@ MOST_LATE, MOST_EARLY = 0.8, 0.1
 
 MOST_ALARMS = 3
 """Most alarms of a watch that are examined, from the last."""
-
-INTERVAL_DROP = 1.92
-"""Log-likelihood below the best up to which a time is in the 95 % interval [dimensionless]: half of chi-squared's."""
 
 
 @dataclass(frozen=True, eq=False)

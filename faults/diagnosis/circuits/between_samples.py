@@ -17,15 +17,20 @@ from faults.conditions import CONDITIONS
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.circuit_runs import parameter_rows, predicted_outputs
-from faults.diagnosis.circuits.class_fit import WEAK_PRIOR, PointFit, fit_freely, misfit, nominal_runs, normalised_rows
+from faults.diagnosis.circuits.class_fit import (
+    ROUGH_GAIN,
+    WEAK_PRIOR,
+    PointFit,
+    fit_freely,
+    misfit,
+    nominal_runs,
+    normalised_rows,
+)
 from faults.diagnosis.circuits.model_doubt import error_moment, seldom_known_slopes, seldom_known_spreads
 from plant.arrays import Array
 
 ROUNDS = 3
 """Most linear steps to a lead [count]."""
-
-ROUGH_GAIN = 10.0
-"""Gain in log-likelihood below which the search before each ends [dimensionless]."""
 
 CONVERGED_STEP = 0.005
 """Last step over the sample time at which the lead has converged [dimensionless]: it moves severities by some

@@ -29,6 +29,9 @@ FARTHEST = 0.7
 LEAST_GAIN = 0.5
 """Gain in log-likelihood below which the search ends [dimensionless]."""
 
+ROUGH_GAIN = 10.0
+"""The same for a rough search, from near by or followed by others [dimensionless]: a third of a real difference."""
+
 LEAST_PROMISED_GAIN = 2e-3
 """Gain that a step must promise to be tried [dimensionless]: a smaller one moves nothing by a fifteenth of its
 deviation."""

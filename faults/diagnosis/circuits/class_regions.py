@@ -21,6 +21,7 @@ from faults.diagnosis.circuits.class_fit import (
     LASTING,
     LEAST_GAIN,
     LEAST_PROMISED_GAIN,
+    ROUGH_GAIN,
     STARTS,
     WEAK_PRIOR,
     PointFit,
@@ -42,9 +43,6 @@ from faults.diagnosis.circuits.rivals import (
     log_likelihood_behind,
 )
 from plant.arrays import Array
-
-ROUGH_GAIN = 10.0
-"""Gain in log-likelihood below which a search from near by ends [dimensionless]: a third of a real difference."""
 
 STUCK_TRAVEL = 5.0
 """Travel in presliding displacements below which a piston counts as stuck [dimensionless]."""

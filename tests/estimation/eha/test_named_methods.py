@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import estimate_bulk_modulus
-from estimation.eha.named_methods import NAMED, PRINTED_NOISE, PRINTED_Q, PRINTED_R
+from estimation.eha.named_methods import NAMED
 from estimation.filters.methods import METHODS
 from estimation.filters.run import Estimate, run_filter
 from estimation.log_checks.first_belief import START_STD, first_belief
 from estimation.models.eha_forms import ACCELERATION_FORM, BULK_MODULUS, PRINTED_FORM, acceleration_step, printed_step
 from estimation.models.model import ProcessModel
+from estimation.models.published_noise import PRINTED_NOISE, PRINTED_Q, PRINTED_R
 from faults.conditions import CONDITIONS, parameters_for
 from plant.eha.drives import make_drive
 from plant.eha.model import EhaParameters
