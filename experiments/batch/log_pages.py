@@ -56,7 +56,7 @@ def write_log_pages(plan: Plan, store: PartStore, most: int) -> list[str]:
                 record = read_listed(series, rig, kind.required)
                 found = chosen.run(record, *chosen.prepare(rig, options))
             result = {**chosen.blank, "file": one.file, "rig": rig.name, **chosen.entries(found)}
-            page = page_of(chosen, result, found, record).encode()
+            page = page_of(chosen, result, found, record, rig).encode()
             with os_errors_as(f"page of {one.file} cannot be written"):
                 store.folder.write(f"{PAGES}/{file_name(one.file)}", page)
         except HydrostateError as error:

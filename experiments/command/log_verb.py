@@ -125,7 +125,8 @@ def run_log_verb(context: typer.Context, verb: str, doing: str, asked: Mapping[s
         if log in figures and of.chosen.figure is not None:
             of.chosen.figure(found, log.name, figures[log])
         if log in pages.places:
-            pages.write(log, page_of(of.chosen, with_remarks({"file": str(log), **result}, said), found, record))
+            told = with_remarks({"file": str(log), **result}, said)
+            pages.write(log, page_of(of.chosen, told, found, record, of.rig))
         return result
 
     def of_each_kind(results: Sequence[Result]) -> "Iterator[tuple[_Question, list[Result]]]":
@@ -162,14 +163,17 @@ def _agreement(result: Result, found: "Finding") -> list[str]:
     return ["as expected" if result["expected"] in found.named else f"{result['expected']} was expected"]
 
 
-def page_of(chosen: "LogVerb", result: Result, found: "Finding", record: "Record") -> str:
+def page_of(chosen: "LogVerb", result: Result, found: "Finding", record: "Record", bench: "Rig[Any]") -> str:
     """Return the page of a log: that of its kind of actuator, or the common one.
 
     Parameters
     ----------
     result : Mapping
         Entries of the log, with ``file`` and ``rig``.
+    bench : Rig
+        What the log was compared with; the page lists its entries.
     """
     from experiments.log_pages.finding_page import finding_page
+    from experiments.page.rig_table import rig_rows
 
-    return (chosen.page or finding_page)(result, found, record)
+    return (chosen.page or finding_page)({**result, "rig_rows": rig_rows(bench)}, found, record)

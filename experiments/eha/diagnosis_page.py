@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from estimation.notes import EstimateCode
 from experiments.eha.plain_verdict import (
     causes,
     confidence_cost_onset,
@@ -65,7 +66,7 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         "library": library_sentence(result),
         "not_told": []
         if is_doubted(result)
-        else [sentence(said) for said in (*bulk_modulus_doubts(result), *result["not_told"])],
+        else [sentence(said) for said in (*bulk_modulus_doubts(result), *result["not_told"], *_to_measure(result))],
         "warnings": [sentence(said) for said in _chart_notes(result)],
         "shares": [
             (condition_in_words(condition), 100.0 * share, percent_text(share), share < LEAST_SHARE)
@@ -85,6 +86,11 @@ def diagnosis_page(result: Mapping[str, Any], found: "Finding", record: "Record"
         },
     }
     return render_page("eha/diagnosis.html", facts, {}, {})
+
+
+def _to_measure(result: Mapping[str, Any]) -> list[str]:
+    """Return which entry of the rig file to measure for surer numbers."""
+    return [one["text"] for one in result["notes"] if one["code"] == EstimateCode.KNOWN_AS_THE_RIG]
 
 
 def _chart_notes(result: Mapping[str, Any]) -> list[str]:

@@ -55,7 +55,7 @@ def compare_view(first: Mapping[str, Any], second: Mapping[str, Any], identities
         "quantities": quantities_shown(rows, doubted=is_unreliable(first) or is_unreliable(second)),
         "probabilities": _probabilities_shown(*(_fitting_conditions(one) for one in (first, second))),
     }
-    names = [log["file"] for log in logs]
+    names = [str(log["file"]) for log in logs]
     headed = {
         "quantities": (
             "quantity",

@@ -307,7 +307,7 @@ class Log(Shown):
             found = self._found(chosen, record, rig, prepared)
         entries = {**chosen.blank, **chosen.entries(found)}
 
-        words = Words(self.plant, verb, asked, rig.name, record, self._said)
+        words = Words(self.plant, verb, asked, rig, record, self._said)
         return Answer(found, entries, words.screen, partial(words.page, found, entries), self._name)
 
     def _found(self, chosen: "LogVerb", record: "Record", rig: "Rig[Any]", prepared: Any) -> "Finding":

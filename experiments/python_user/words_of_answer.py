@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
     from estimation.finding import Finding
     from experiments.actuator_kind import LogVerb
+    from plant.eha.rig import Rig
     from plant.errors import LogWarning
     from plant.log.record import Record
 
@@ -23,8 +24,8 @@ class Words:
         Kind of actuator, and the verb that was run.
     options : Mapping[str, Any]
         The verb's options.
-    rig : str
-        Name of the rig.
+    rig : Rig
+        What the log was compared with.
     record : Record
         The log.
     said : sequence of LogWarning
@@ -34,7 +35,7 @@ class Words:
     plant: str
     verb: str
     options: Mapping[str, Any]
-    rig: str
+    rig: "Rig[Any]"
     record: "Record"
     said: "Sequence[LogWarning]"
 
@@ -52,5 +53,5 @@ class Words:
         from experiments.command.log_verb import page_of
         from experiments.command.logs import with_remarks
 
-        about = {"file": title, "plant": self.plant, "rig": self.rig, "seed": 2024, "expected": None}
-        return page_of(self._chosen(), with_remarks({**about, **entries}, self.said), found, self.record)
+        about = {"file": title, "plant": self.plant, "rig": self.rig.name, "seed": 2024, "expected": None}
+        return page_of(self._chosen(), with_remarks({**about, **entries}, self.said), found, self.record, self.rig)

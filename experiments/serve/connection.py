@@ -50,7 +50,7 @@ class PatientProtocol(H11Protocol):
         super().data_received(data)
         self._update_timer()
 
-    def eof_received(self) -> bool:
+    def eof_received(self) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride] -- asyncio's own type
         """Answer a client that has sent all and only listens now; return whether the connection stays open."""
         if self.transport.is_closing():
             return False

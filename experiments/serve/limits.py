@@ -104,7 +104,8 @@ class Guard:
                 return
             await self._app(scope, exchange.receive, exchange.send)
         except RefusedError as refused:
-            again = [about for status, about in ((429, RETRY), (400, CLOSE)) if refused.status == status]
+            again: list[tuple[bytes, bytes]] = [RETRY] if refused.status == 429 else []
+            again += [CLOSE] if refused.status == 400 else []
             page = wants_page(scope["method"], scope["path"], headers.get(b"accept", b"").decode("latin-1"))
             await exchange.answer(refused.status, refused.detail, again, page)
         finally:

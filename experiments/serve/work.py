@@ -174,7 +174,7 @@ def _analyse(task: Task) -> LogResult:
     found = chosen.run(record, rig, prepared)
     result = {**chosen.blank, "plant": kind.name, "rig": bench.name, **chosen.entries(found)}
     tell_phase(task.phase, WRITING)
-    _write(task, page_of(chosen, with_remarks({"file": task.name, **result}, said), found, record))
+    _write(task, page_of(chosen, with_remarks({"file": task.name, **result}, said), found, record, bench))
     if task.verb != "diagnose":
         return LogResult(result, None)
     if kind.name == "eha":

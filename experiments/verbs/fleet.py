@@ -324,7 +324,7 @@ def _page_writer(
             record = read_log(log, bench.columns, mapping, kind.required, sample_time=sample_time)
             found = chosen.run(record, *chosen.prepare(bench, {**chosen.options, "seed": 0}))
         result = {**chosen.blank, "file": file, "rig": bench.name, **chosen.entries(found)}
-        write_whole(path, page_of(chosen, result, found, record), "--out", parents=True)
+        write_whole(path, page_of(chosen, result, found, record, bench), "--out", parents=True)
         return True
 
     return write

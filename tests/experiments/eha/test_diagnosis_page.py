@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from estimation.finding import Finding
+from estimation.notes import EstimateCode
 from experiments.batch.diagnosis import class_row
 from experiments.eha.diagnosis_page import diagnosis_page
 from experiments.eha.entries import diagnosis_entries
 from experiments.eha.verdict_words import verdict_lines
+from experiments.page.rig_table import rig_rows
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.diagnose import diagnose_log
 from faults.diagnosis.not_told import without_undetermined
@@ -93,6 +95,23 @@ def test_severities_that_the_log_does_not_determine_have_no_state(diagnosed: tup
     said = verdict_lines({"file": "run.csv", **diagnosis_entries(unseen)})
     assert "  friction  friction added at rated speed not determined; pressure rise not determined" in said
     assert set(json.loads(class_row(unseen)["quantities"])) == {"leakage_flow", "bulk_modulus", "entrained_air"}
+
+
+def test_what_makes_the_numbers_surer_is_said_below_them(diagnosed: tuple[Finding, Record]) -> None:
+    found, log = diagnosed
+    measure = EstimateCode.KNOWN_AS_THE_RIG.note(entry="chamber_volume", percent=91.0, quantity="bulk_modulus")
+    noted = replace(found, notes=(measure,))
+    result = {"file": "run.csv", "rig": "bench 7", **diagnosis_entries(noted)}
+    page = diagnosis_page({**result, "rig_rows": rig_rows(Rig("bench 7"))}, noted, log)
+    assert "<p>Measure chamber_volume: its uncertainty in the rig file causes 91" in page.replace(
+        "\N{NO-BREAK SPACE}", " "
+    )
+    assert "The rig file, entry by entry" in page
+    assert "<code>chamber_volume</code>" in page
+    doubted = replace(noted, unknown=True)
+    assert "Measure chamber_volume" not in diagnosis_page(
+        {**result, "unknown": True, "reasons": ["the pump is worn"]}, doubted, log
+    )
 
 
 def test_a_page_names_the_rig_that_the_log_was_compared_with(page: str, diagnosed: tuple[Finding, Record]) -> None:
