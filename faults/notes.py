@@ -88,7 +88,7 @@ class ClassCode(Code):
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
     VELOCITY_LOST_TOLD = (
-        "how much velocity leakage costs is known all the same: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
+        "the velocity lost is known all the same: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
     )
     STUCK_NOT_TOLD = (
         "a make-up valve that is stuck shut but never had to open leaves no trace; this fault, which is not one of "

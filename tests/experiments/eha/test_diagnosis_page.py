@@ -128,3 +128,6 @@ def test_the_probability_of_faults_outside_the_nine_is_given(diagnosed: tuple[Fi
     page = diagnosis_page({"file": "run.csv", "rig": "paper", **diagnosis_entries(worn)}, worn, log)
     assert "The remaining 75\N{NO-BREAK SPACE}% is that of faults that are none of the nine and that the log" in page
     assert "if the actuator is in one of the nine" not in page
+    rare = replace(found, probabilities={name: 0.995 / told * share for name, share in found.probabilities.items()})
+    page = diagnosis_page({"file": "run.csv", "rig": "paper", **diagnosis_entries(rare)}, rare, log)
+    assert "The remaining 0.5\N{NO-BREAK SPACE}% is that of faults" in page  # the shares above are of 99.5 %
