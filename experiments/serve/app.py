@@ -21,6 +21,7 @@ from starlette.types import Scope
 from experiments.command.terminal import error_sentence, note
 from experiments.log_pages.comparison import comparison_rows
 from experiments.serve.answers import Comparison, Health, Log, Logs, Refusal, StreamHistory, StreamState, Verb, log_of
+from experiments.serve.connection import ALL_SENT
 from experiments.serve.events import MOST_STREAM_VIEWS, event_stream
 from experiments.serve.limits import (
     HEADERS,
@@ -296,9 +297,11 @@ def _offer_streams(app: FastAPI, service: Service) -> None:
         one = service.stream(name)
         if service.streams.looking >= MOST_STREAM_VIEWS:
             raise RefusedError(429, f"{MOST_STREAM_VIEWS} views are open, close one")
-        return StreamingResponse(
-            event_stream(one, service.streams, request.is_disconnected), media_type="text/event-stream"
-        )
+
+        async def gone() -> bool:
+            return ALL_SENT in request.scope.get("state", {}) or await request.is_disconnected()
+
+        return StreamingResponse(event_stream(one, service.streams, gone), media_type="text/event-stream")
 
 
 def _offer_pages(app: FastAPI, service: Service) -> None:

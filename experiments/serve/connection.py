@@ -16,6 +16,9 @@ READ_TIMEOUT = 30.0
 MOST_CONNECTIONS = 512
 """Largest number of connections, fewer if the system allows fewer files [count]."""
 
+ALL_SENT = "all_sent"
+"""Entry of a request's state: its client has sent all, so it has left or only listens."""
+
 FULL_RESPONSE = b"HTTP/1.1 429 Too Many Requests\r\nretry-after: 5\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
 
 TIMEOUT_RESPONSE = b"HTTP/1.1 408 Request Timeout\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
@@ -55,6 +58,8 @@ class PatientProtocol(H11Protocol):
         if self.transport.is_closing():
             return False
         self._all_sent = True
+        if self._is_answering():
+            self.scope.setdefault("state", {})[ALL_SENT] = True  # an answer without end may stop: hardly anyone listens to it
         if self.conn.their_state is h11.SEND_BODY and self.conn.our_state is h11.SEND_RESPONSE:
             self.send_400_response("The body was cut off.")
         return not self.transport.is_closing() and self._is_answering()

@@ -299,3 +299,25 @@ def test_a_body_that_is_cut_off_is_refused_and_the_application_gets_a_disconnect
     assert not stays
     assert wire.written.startswith(b"HTTP/1.1 400")
     assert wire.closed
+
+
+def test_an_application_is_told_that_its_client_has_sent_all() -> None:
+    told: list[bool] = []
+
+    async def listens(scope: Any, _: Any, send: Any) -> None:
+        told.append(connection.ALL_SENT in scope["state"])
+        await asyncio.sleep(2.0 * SOON)
+        told.append(connection.ALL_SENT in scope["state"])
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def said() -> None:
+        protocol, wire = connected(listens)
+        protocol.data_received(ASKED)
+        await asyncio.sleep(0)
+        protocol.eof_received()
+        await answered(wire)
+        protocol.connection_lost(None)
+
+    asyncio.run(said())
+    assert told == [False, True]
