@@ -87,9 +87,7 @@ class ClassCode(Code):
         "spread of this factor among actuators of one kind"
     )
     LEAKAGE_AND_BIAS_ALIKE = "the log does not separate leakage coefficient and flow bias (a constant loss of the pump)"
-    VELOCITY_LOST_TOLD = (
-        "the velocity lost is known all the same: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
-    )
+    VELOCITY_LOST_TOLD = "the velocity lost is known all the same: {percent:z.1f} % ({low:z.1f} to {high:z.1f})"
     STUCK_NOT_TOLD = (
         "a make-up valve that is stuck shut but never had to open leaves no trace; this fault, which is not one of "
         "the nine conditions, keeps a probability of {percent:.0f} %"
