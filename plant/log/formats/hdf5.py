@@ -51,14 +51,14 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     with h5py.File(path, "r") as file:
         for name, one in _data_sets(h5py, file):
             group, _, leaf = name.rpartition("/")
+            if one.is_virtual or one.external:
+                elsewhere = True
+                continue
             if _attribute(one, "MATLAB_class") == "char":
                 if leaf == METADATA:
                     texts[group] = _text(one, most, str(path))
                 continue
             if not _holds_numbers(one):
-                continue
-            if one.is_virtual or one.external:
-                elsewhere = True
                 continue
             left -= one.size * one.dtype.itemsize
             if left < 0:

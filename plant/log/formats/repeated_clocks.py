@@ -1,5 +1,6 @@
 """Clocks that a file repeats beside each channel: LabVIEW, Simulink and spreadsheets write time and value in pairs."""
 
+import re
 import warnings
 from dataclasses import replace
 
@@ -26,7 +27,8 @@ def without_repeated_clocks(table: Table) -> Table:
     >>> [one.name for one in without_repeated_clocks(table_of("log", pairs)).headings]
     ['time', 'speed', 'time of way', 'way']
     """
-    clocks = [place for place, one in enumerate(table.headings) if _is_clock(one)]
+    named = [(place, _name_without_number(one)) for place, one in enumerate(table.headings) if _is_clock(one)]
+    clocks = [place for place, name in named if name == named[0][1]]  # a clock of another name may be asked for
     if len(clocks) < 2:
         return table
     columns = [Column(place, table.headings[place].name, f"{TRUTH_PREFIX}{place}") for place in clocks]
@@ -47,3 +49,7 @@ def without_repeated_clocks(table: Table) -> Table:
 
 def _is_clock(heading: Heading) -> bool:
     return heading.stamped or heading.name == TIME or heading.stem in TIME_NAMES
+
+
+def _name_without_number(heading: Heading) -> str:
+    return re.sub(r"[\d_]+$", "", heading.stem)

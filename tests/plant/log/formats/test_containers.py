@@ -155,6 +155,9 @@ def test_numbers_that_an_hdf5_file_takes_from_other_files_or_from_itself_are_not
         itself[:] = h5py.VirtualSource(".", "speed", (50,))  # reading it would end the process
         file.create_virtual_dataset("speed", itself)
         file.create_dataset("position", (50,), "f8", external=[(str(secret), 0, 400)])
+        text = h5py.VirtualLayout((50,), "u2")
+        text[:] = h5py.VirtualSource(".", "metadata_json", (50,))
+        file.create_virtual_dataset("metadata_json", text).attrs["MATLAB_class"] = np.bytes_("char")
     with pytest.raises(LogError, match="stored in other files"):
         open_hdf5(path)
     with h5py.File(path, "a") as file:

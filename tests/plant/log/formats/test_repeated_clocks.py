@@ -32,3 +32,11 @@ def test_equal_clocks_beside_each_channel_are_one(tmp_path: Path, clock: str) ->
 def test_clocks_that_differ_in_one_row_are_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="both give time_s"):
         read_record(log(tmp_path / "log.csv", "time_s", late=True))
+
+
+def test_an_equal_clock_of_another_name_keeps_it(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "\n".join(["t,Timestamp,motor_speed_rpm,position_mm", *(f"{k},{k},{9 * k},{k}" for k in range(60))])
+    )
+    assert read_record(path, columns={"time_s": "Timestamp:ms"}).sample_time == pytest.approx(1e-3)
