@@ -146,26 +146,6 @@ def test_a_matlab_hdf5_matrix_is_transposed_and_files_without_numbers_are_refuse
         open_hdf5(tmp_path / "none.h5")
 
 
-def test_numbers_that_an_hdf5_file_takes_from_other_files_or_from_itself_are_not_read(tmp_path: Path) -> None:
-    secret = tmp_path / "secret.bin"
-    secret.write_bytes(np.arange(50.0).tobytes())
-    path = tmp_path / "log.h5"
-    with h5py.File(path, "w") as file:
-        itself = h5py.VirtualLayout((50,), "f8")
-        itself[:] = h5py.VirtualSource(".", "speed", (50,))  # reading it would end the process
-        file.create_virtual_dataset("speed", itself)
-        file.create_dataset("position", (50,), "f8", external=[(str(secret), 0, 400)])
-        text = h5py.VirtualLayout((50,), "u2")
-        text[:] = h5py.VirtualSource(".", "metadata_json", (50,))
-        file.create_virtual_dataset("metadata_json", text).attrs["MATLAB_class"] = np.bytes_("char")
-    with pytest.raises(LogError, match="stored in other files"):
-        open_hdf5(path)
-    with h5py.File(path, "a") as file:
-        file["time"] = np.arange(50.0)
-    (table,) = open_hdf5(path)
-    assert names(table) == ["time"]
-
-
 def test_a_workbook_is_known_by_its_content_whatever_its_suffix(tmp_path: Path) -> None:
     path = workbook(tmp_path / "log.xlsx", [["time_s", "position_mm"], *([0.1 * k, k] for k in range(9))])
     (table,) = open_tables(path.rename(tmp_path / "log.csv"))
