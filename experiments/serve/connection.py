@@ -59,9 +59,7 @@ class PatientProtocol(H11Protocol):
             return False
         self._all_sent = True
         if self._is_answering():
-            self.scope.setdefault("state", {})[ALL_SENT] = (
-                True  # an answer without end may stop: hardly anyone listens to it
-            )
+            self.scope.setdefault("state", {})[ALL_SENT] = True  # an endless answer may stop: hardly anyone listens
         if self.conn.their_state is h11.SEND_BODY and self.conn.our_state is h11.SEND_RESPONSE:
             self.send_400_response("The body was cut off.")
         return not self.transport.is_closing() and self._is_answering()
