@@ -19,6 +19,7 @@ from estimation.identification.free_run.from_records import channels_of
 from estimation.identification.free_run.identify import Identified, identify_channels
 from estimation.identification.notes import IdentificationCode
 from estimation.identification.state_space.identify import identify_outputs
+from estimation.identification.two_stage_spread import Stage, with_first_stage
 from plant.errors import HydrostateError, LogWarning
 from plant.log.record import Record
 from plant.notes import Note
@@ -94,14 +95,16 @@ def identify_by_reference(data: Sequence[Channels], drives: Sequence[Channels], 
         If an input does not follow the references.
     """
     explained = [_explained_input(one) for one in drives]
-    u = tuple(np.column_stack([runs[log] for runs, _ in explained]) for log in range(len(data[0].u)))
-    found = identify_outputs([replace(one, u=u) for one in data], **options)
-    notes = tuple(note for _, note in explained)
+    u = tuple(np.column_stack([runs[log] for runs, _, _ in explained]) for log in range(len(data[0].u)))
+    driven = [replace(one, u=u) for one in data]
+    found, stages = identify_outputs(driven, **options), [stage for _, _, stage in explained]
+    found = [with_first_stage(one, one.at_one_offset(each), stages) for one, each in zip(found, driven, strict=True)]
+    notes = tuple(note for _, note, _ in explained)
     return [replace(one, notes=(*one.notes, *notes)) for one in found]
 
 
-def _explained_input(drive: Channels) -> tuple[list[Array], Note]:
-    """Return the part of an input that references explain, for each log, with a note of its share."""
+def _explained_input(drive: Channels) -> tuple[list[Array], Note, Stage]:
+    """Return the part of an input that references explain, for each log, a note of its share, and its model."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LogWarning)
         stage = identify_channels(drive)
@@ -112,4 +115,5 @@ def _explained_input(drive: Channels) -> tuple[list[Array], Note]:
             f"{stage.held_back_percent:.1f} %): name a column that drives the loop, such as its set-point"
         )
     runs = [stage.model.simulate(r, u) for r, u in zip(drive.u, drive.y, strict=True)]
-    return runs, IdentificationCode.TWO_STAGES.note(input=drive.output, reference=named, share=share)
+    note = IdentificationCode.TWO_STAGES.note(input=drive.output, reference=named, share=share)
+    return runs, note, Stage(stage.model, drive)

@@ -49,6 +49,16 @@ class LinearDynamics(OutputErrorDynamics):
             (np.concatenate([np.zeros(delay), b]), self.f) for b, delay in zip(parts, self.form.delays, strict=True)
         ]
 
+    def gain_slopes(self) -> Array:
+        """Return the derivative of the steady gain from each input by numerators and denominator, shape (m, p)."""
+        total, ends = float(self.f.sum()), np.cumsum([0, *self.form.sizes])
+        slopes = np.zeros((len(self.form.sizes), self.form.n_b + self.form.order))
+        for k, slope in enumerate(slopes):
+            own = slice(int(ends[k]), int(ends[k + 1]))
+            slope[own] = 1.0 / total
+            slope[self.form.n_b :] = -float(self.theta[own].sum()) / total**2
+        return slopes
+
     def undetermined_outputs(self, length: int) -> int:
         """Return how many first outputs of a log of a given length [samples] depend on inputs from before it."""
         return self.form.undetermined_outputs(length)

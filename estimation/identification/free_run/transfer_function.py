@@ -6,6 +6,7 @@ from estimation.arrays import Array
 from estimation.identification.fit.covariances import Spread, spread_of_fit
 from estimation.identification.fit.validate import estimate_initial_state
 from estimation.identification.free_run.data import Channels, Scaling
+from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_problem import LinearFit, Problem
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.search.experiments import Experiments, data_hash
@@ -71,18 +72,11 @@ def gain_deviations(fit: LinearFit, data: Channels, by: Scaling) -> tuple[float,
     tuple of float
         One per input [output unit / input unit].
     """
-    form, total = fit.form, float(fit.f.sum())
-    n_main = form.n_b + form.order
-    spread = _residual_and_spread(fit, Problem(form, data))[2].taken[:n_main, :n_main]
-    ends = np.cumsum([0, *form.sizes])
-    deviations = list[float]()
-    for k, b in enumerate(fit.numerators):
-        slope = np.zeros(n_main)
-        slope[ends[k] : ends[k + 1]] = 1.0 / total
-        slope[form.n_b :] = -float(b.sum()) / total**2
-        variance = float(slope @ spread @ slope)
-        deviations.append(float(np.sqrt(variance)) * by.y_std / float(by.u_std[k]))
-    return tuple(deviations)
+    n_main = fit.form.n_b + fit.form.order
+    spread = _residual_and_spread(fit, Problem(fit.form, data))[2].taken[:n_main, :n_main]
+    slopes = LinearDynamics.of(fit).gain_slopes()
+    variances = np.einsum("ij,jk,ik->i", slopes, spread, slopes)
+    return tuple((np.sqrt(variances) * by.y_std / by.u_std).tolist())
 
 
 def _residual_and_spread(fit: LinearFit, problem: Problem) -> tuple[Array, Array, Spread]:

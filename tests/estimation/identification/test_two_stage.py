@@ -55,3 +55,16 @@ def test_a_reference_that_does_not_drive_the_input_or_is_the_output_is_refused()
         identify_columns([closed_loop(1, 200)], ["u"], ["y"], references=["other"])
     with pytest.raises(HydrostateError, match="neither input nor output"):
         identify_columns([closed_loop(1)], ["u"], ["y"], references=["y"])
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::plant.errors.LogWarning")
+def test_the_deviation_of_a_gain_counts_what_the_first_stage_leaves_uncertain() -> None:
+    found = [
+        identify_columns([closed_loop(seed)], ["u"], ["y"], references=["r"], options=FORM)[0][0] for seed in range(8)
+    ]
+    models = [one.model.linear for one in found]
+    deviations = [(one.dc_gain - 1.0) / one.dc_gain_std for one in models if one is not None]
+    assert len(deviations) == 8
+    # without the first stage 2.5
+    assert 0.5 < float(np.sqrt(np.mean(np.square(deviations)))) < 1.8
