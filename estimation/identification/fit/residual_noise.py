@@ -104,6 +104,11 @@ def noise_seen(found: NoiseSpectrum, columns: Array) -> Array:
     ----------
     columns : ndarray, shape (n, p)
         J, zero where a sample is missing.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Not negative.
     """
     size = transform_size(max(len(columns), found.whitened.size))
     density = found.on_grid(size)
