@@ -29,6 +29,7 @@ from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, 
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.shut_valves import shut_valves
 from estimation.fits.flow.told_volume import explained_bound, ratio_doubt
+from estimation.fits.greybox.lateness import omitted_delay_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, omitted_play_note, play_structure, sensed_play
 from estimation.fits.greybox.small_pump_ripple import with_shifts
 from estimation.fits.greybox.work_limit import Work, WorkSpentError
@@ -299,7 +300,7 @@ def _explained_fit(plain: PlainFits, strange: Explanation, sensed: ShownPlay, tr
         untaken, open_play = plain.play_untaken(one.play, sensed)
         left = float(np.hypot(STRUCTURE_FILTERED if traits.filtered else STRUCTURE, untaken))
         shown = omitted_play_note(one.play, sensed)
-    doubts = [left, ratio_doubt(strange, plain.log.uncertainties)]
+    doubts = [left, ratio_doubt(strange, plain.log.uncertainties), omitted_delay_doubt(one.late)]
     doubts += [UNEVEN_OIL] if is_single(strange.values, p.area_difference) else []
     doubts += [STRUCTURE_WITH_AIR] if {AIR.name, AIR_MIDWAY.name} & set(strange.names) else []
     left = float(np.linalg.norm(doubts))
@@ -327,14 +328,14 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     found, correlation = with_lumped(model_mean(plain.fits, weights), plain.fits, weights, p, plain.log.measured_rms)
     found = with_shifts(found, best.small_teeth, best.noise_shift)
     sure = CRACKS[0] in best.values or best.model.rates is HELD_FLOW_FORM.rates
-    left = UNEVEN_OIL if p.single_rod else DISCRETISED
+    left = max(UNEVEN_OIL if p.single_rod else DISCRETISED, 0.0 if sure else STRUCTURE)
     untaken, open_play = plain.play_untaken(plain.swinging.play, sensed)
     reasons = objections_and_play(best, plain.log.passes_on, plain.swinging.play, sensed) or plain.teeth_left
     if begun and not reasons and not explanation_test(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), gas = found["bulk_modulus"], () if reasons else gas_contradicted(plain.log, plain.swinging, p)
     return FormFit(
-        parameters=with_structure(found, float(np.hypot(left if sure else max(left, STRUCTURE), untaken))),
+        parameters=with_structure(found, float(np.linalg.norm([left, untaken, omitted_delay_doubt(best.late)]))),
         bound=std / value,
         chi_square=best.chi_square[0],
         reasons=reasons,

@@ -6,13 +6,13 @@ from math import prod
 
 import numpy as np
 
-from estimation.fits.hypothesis_search.fault_guesses import faulty_coefficient
+from estimation.fits.hypothesis_search.fault_guesses import WORST_LEAKAGE, faulty_coefficient
 from estimation.models.greybox import GreyBoxModel
 from plant.arrays import Array
 from plant.eha.model import EhaParameters
 
 GUESSED: Mapping[str, Sequence[float]] = {
-    "leakage_coefficient": (1.0, 2.5, 5.0, 8.0, 12.5),
+    "leakage_coefficient": (1.0, 2.5, 5.0, 8.0, WORST_LEAKAGE),
     "flow_bias": (1.0, 3.5, 6.0),
     "bulk_modulus": (0.7, 1.0, 1.3),
 }

@@ -14,7 +14,7 @@ from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
 from estimation.fits.greybox.intersample_speed import straight_line_speed
 from estimation.fits.greybox.leaked_noise import encoder_noise
 from estimation.fits.greybox.log import GreyBoxLog, greybox_log
-from estimation.fits.hypothesis_search.fault_guesses import leakage_guess
+from estimation.fits.hypothesis_search.fault_guesses import leakage_guess, leakage_range
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged, within_gaps
 from estimation.log_checks.dropout import LONG_GAP, without_pauses
@@ -41,7 +41,8 @@ DRAIN_START = 0.05
 
 PRESUMED_STD = 1.0
 """Prior standard deviation of the logarithms of the last two [dimensionless]. If make-up valves never open, no log can
-distinguish a drain from leakage, and any drain would fit."""
+distinguish a drain from leakage, and any drain would fit. A drain is doubted more where worn seals may leak hundreds of
+times as much as sound ones, see `leakage_range`."""
 
 WITHIN: Mapping[str, float] = {"makeup_conductance": math.log(100.0)}
 """Standard deviation of the logarithm of a make-up valve's conductance about the value that a search finds
@@ -186,14 +187,14 @@ def flow_log(
     log = replace(
         log,
         noise=(replace(log.noise[0], passed_on=passed_on, passed_by="bulk_modulus"),),
-        timed=FLOW_FORM.drives,
+        timed=(*FLOW_FORM.drives, *FLOW_FORM.outputs),
         drive_std=(log.drive_std[0], 0.0),  # the output noise includes position noise
         # the piston's place is unknown within a gap of its position, but known after it
         drives=_with_gaps_balanced(open_gaps, record, drives, parameters),
         measured=np.where(within_gaps(record["position_m"])[:, None], np.nan, log.measured),
         gaps=open_gaps,
         presumed={
-            "case_leakage": (DRAIN_START * leakage_guess(parameters), PRESUMED_STD),
+            "case_leakage": (DRAIN_START * leakage_guess(parameters), PRESUMED_STD * leakage_range(parameters)),
             "makeup_opening": (OPENING_START, PRESUMED_STD),
             "speed_lead": (0.0, MOST_LEAD * record.sample_time / dict(FLOW_FORM.linear)["speed_lead"]),
             **dict.fromkeys((*CRACKS, BEND), (0.0, 1.0)),

@@ -8,16 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.deviations import Information, covariance_of, information, prior_precision
-from estimation.fits.greybox.lateness import lateness, residuals_and_changes, unabsorbed_part
+from estimation.fits.greybox.deviations import covariance_of, information, prior_precision
+from estimation.fits.greybox.lateness import Delays, late_and_play, residuals_and_changes
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.noise_shift import noise_shift
-from estimation.fits.greybox.play import NO_PLAY, ShownPlay, shown_play
+from estimation.fits.greybox.play import NO_PLAY, ShownPlay
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.pump_ripple import NO_OFFSET, ShownOffset, ShownRipple, shown_ripple
 from estimation.fits.greybox.rig_response import responses_to_rig
@@ -64,8 +63,8 @@ class GreyBoxFit:
     rig_slopes : Mapping[str, Mapping[str, float]]
         By uncertain entry of the rig: change of each unknown, in SI, per relative change of the entry.
     late : Mapping[str, tuple of float]
-        By driving channel whose timing is tested: its apparent delay [s], and the first-order gain in log-likelihood of
-        removing it [dimensionless].
+        By channel whose timing is tested: its apparent delay [s], and what removing it does to first order: the gain in
+        log-likelihood [dimensionless], and the change of bulk modulus [fraction].
     play : ShownPlay
         What the residuals show of an encoder's play, if a fit tests for it.
     slopes : ndarray, shape (outputs * blocks, unknowns)
@@ -95,7 +94,7 @@ class GreyBoxFit:
     chi_square: tuple[float, ...]
     autocorrelation: tuple[float, ...]
     rig_slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
-    late: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    late: Delays = field(default_factory=dict[str, tuple[float, float, float]])
     play: ShownPlay = NO_PLAY
     slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
     covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
@@ -278,14 +277,14 @@ def fit_at_solution(
     errors, all_slopes = problem.linearised(theta)
     effects = np.einsum("ij,ij->j", all_slopes, all_slopes)
     felt = np.flatnonzero(effects > np.where(prior_precision(problem) > 0.0, 0.0, LEAST_EFFECT**2))
-    whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float]]()
+    whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float, float]]()
     play, teeth, offset, by_noise = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET, NO_SHIFTS
     used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
     if len(felt) and used > len(theta):
         known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
         left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
         told = disturbed and asked
-        here, moved = residuals_and_changes(problem, theta) if told else (None, [])
+        here, moved = residuals_and_changes(problem, theta, errors) if told else (None, [])
         covariance = covariance_of(
             problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here, moved=moved_by_noise
         )
@@ -299,7 +298,7 @@ def fit_at_solution(
         if told:
             by_noise = noise_shift(problem, theta, known_of)
             rig = dict(responses_to_rig(with_steps(problem, steps), theta, known_of))
-            late, play = _late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
+            late, play = late_and_play(problem, known_of, moved, effects[felt] > LEAST_EFFECT**2)
     # infinite for unknowns that this log does not determine
     noise = np.where(effects > LEAST_EFFECT**2, np.sqrt(np.diag(whole)), np.inf)
     # fitted ripple is not small, and in a slow log the course of the motor looks like ripple
@@ -328,17 +327,6 @@ def fit_at_solution(
         seen=seen,
         steps=steps,
     )
-
-
-def _late_and_play(
-    problem: Problem, known_of: Information, moved: Sequence[Array], told: NDArray[np.bool_]
-) -> tuple[dict[str, tuple[float, float]], ShownPlay]:
-    """Return the apparent delays of drives, and what the residuals show of an encoder's play."""
-    timed, left_over, at_play = problem.log.timed, known_of.left_over, moved[len(problem.log.timed) :]
-    left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
-    names = [problem.model.unknowns[place] for place in known_of.felt]
-    late = dict(lateness(timed, moved, left_over, left))
-    return late, shown_play(at_play, left_over, left, lambda one: zip(names, known_of.response(one), strict=False))
 
 
 def _statistics(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...], float]:

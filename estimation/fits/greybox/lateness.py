@@ -1,27 +1,43 @@
-"""Delay of a driving channel, from the residuals of a fit: Rao's score statistic."""
+"""Delay of a channel, from the residuals of a fit: Rao's score statistic."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.greybox.play import crossed_drives
+from estimation.finding import NORMAL_95
+from estimation.fits.greybox.deviations import Information
+from estimation.fits.greybox.play import ShownPlay, crossed_drives, shown_play
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import LATEST
-from estimation.log_checks.channel_names import POSITION
+from estimation.log_checks.channel_names import POSITION, PRESSURE
 from plant.arrays import Array
 
 LEAST_LATE = 2e-4
 """Least delay or lead of a channel that is reported [s]."""
 
 LATE_NUDGE = 1e-5
-"""Time by which a driving channel is shifted for the finite difference [s]."""
+"""Time by which a channel is shifted for the finite difference [s]."""
+
+LEAD = "speed_lead"
+
+BY_CHANCE = 0.5 * NORMAL_95**2
+"""Gain in log-likelihood that the delay of a channel on time exceeds in one log of twenty [dimensionless]."""
 
 
-def residuals_and_changes(problem: Problem, theta: Array) -> tuple[Array | None, list[Array]]:
+Delays: TypeAlias = dict[str, tuple[float, float, float]]
+"""By channel: how late it seems [s], and what removing that does to first order: the gain in log-likelihood
+[dimensionless], and the change of bulk modulus [fraction]."""
+
+
+def residuals_and_changes(problem: Problem, theta: Array, errors: Array) -> tuple[Array | None, list[Array]]:
     """Return the residuals under the log's drives, with one model step per sample, and their changes by other drives.
 
-    The other drives are each tested channel, shifted a little, and the courses of an encoder play.
+    The other drives are each tested channel, shifted a little, and the courses of an encoder play. A pressure that is
+    late is the same log as drives that are all early. Where make-up valves
+    fill a small chamber within a sample, such steps chatter, and a small shift seems to change the run by far more than
+    noise: no delay could be seen then. So the changes have the problem's own steps there.
 
     Parameters
     ----------
@@ -29,6 +45,8 @@ def residuals_and_changes(problem: Problem, theta: Array) -> tuple[Array | None,
         The problem.
     theta : ndarray, shape (unknowns,)
         Its solution [dimensionless].
+    errors : ndarray, shape (outputs, blocks)
+        The normalised residuals there, with its own steps [dimensionless].
 
     Returns
     -------
@@ -41,11 +59,14 @@ def residuals_and_changes(problem: Problem, theta: Array) -> tuple[Array | None,
     reach = max(1, round(0.5 * log.block / log.sample_time))
     padded = np.pad(log.drives, ((reach, reach), (0, 0)), mode="edge")
     ahead = LATE_NUDGE * (padded[2 * reach :] - padded[: -2 * reach]) / (2 * reach * log.sample_time)
-    places = [problem.model.drives.index(channel) for channel in log.timed]
-    forward = [log.drives + np.where(np.arange(log.drives.shape[1]) == place, ahead, 0.0) for place in places]
+    columns = np.array(problem.model.drives)
+    forward = [
+        log.drives - ahead if channel == PRESSURE else log.drives + np.where(columns == channel, ahead, 0.0)
+        for channel in log.timed
+    ]
     crossed = crossed_drives(problem) if POSITION in log.timed else []
-    known, *found = problem.coarse.disturbed(theta, [log.drives, *forward, *crossed])
-    return known, [one - known for one in found]
+    (known,) = problem.coarse.disturbed(theta, [log.drives])
+    return known, [one - errors for one in problem.disturbed(theta, [*forward, *crossed])]
 
 
 def unabsorbed_part(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Callable[[Array], Array]:
@@ -78,7 +99,7 @@ def unabsorbed_part(slopes: Array, bread: Array, told: NDArray[np.bool_]) -> Cal
 def lateness(
     timed: Sequence[str], changes: Sequence[Array], errors: Array, left: Callable[[Array], Array]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the apparent delay of each tested driving channel, and its score statistic (Rao).
+    """Yield the apparent delay of each tested channel, and its score statistic (Rao).
 
     Parameters
     ----------
@@ -104,13 +125,65 @@ def lateness(
             yield channel, (-along / power, 0.5 * along**2 / power)
 
 
-def latest_channel(late: Mapping[str, tuple[float, float]]) -> tuple[str, float, float]:
-    """Return the driving channel whose timing explains most of what a fit leaves.
+def late_and_play(
+    problem: Problem, known_of: Information, moved: Sequence[Array], told: NDArray[np.bool_]
+) -> tuple[Delays, ShownPlay]:
+    """Return the apparent delays of channels, and what the residuals show of an encoder's play.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    known_of : Information
+        What its solution knows of the unknowns.
+    moved : sequence of ndarray, shape (outputs, blocks)
+        Changes of the residuals, see `residuals_and_changes`; empty if no channel is tested [dimensionless].
+    told : ndarray of bool, shape (unknowns,)
+        Whether the log determines each unknown at all.
+    """
+    timed, left_over = problem.log.timed, known_of.left_over
+    left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
+    names = [problem.model.unknowns[place] for place in known_of.felt]
+
+    # the motor's lead is not negative, and may not take up a late pressure in place of bulk modulus
+    held = np.array([name != LEAD for name in names]) & told
+    bread, slopes = known_of.fitted_bread, known_of.fitted_slopes[:, held]
+    softened = np.zeros(len(names))
+    if "bulk_modulus" in names and held[names.index("bulk_modulus")]:
+        kept = np.linalg.inv(np.linalg.inv(bread)[np.ix_(held, held)])
+        softened[held] = kept[np.count_nonzero(held[: names.index("bulk_modulus")])]
+
+    def taken(one: Array) -> Iterable[tuple[str, float]]:
+        return zip(names, known_of.response(one), strict=False)
+
+    return (
+        _delays(timed, moved, left_over, left, lambda one: float(softened[held] @ (slopes.T @ one.ravel()))),
+        shown_play(moved[len(timed) :], left_over, left, taken),
+    )
+
+
+def _delays(
+    timed: Sequence[str],
+    changes: Sequence[Array],
+    errors: Array,
+    left: Callable[[Array], Array],
+    softened: Callable[[Array], float],
+) -> Delays:
+    """Return the delays, with what bulk modulus takes up (``softened``) of each; the rest as in `lateness`."""
+    by_channel = dict(zip(timed, changes, strict=False))
+    return {
+        channel: (behind, gain, behind * softened(by_channel[channel]) / LATE_NUDGE)
+        for channel, (behind, gain) in lateness(timed, changes, errors, left)
+    }
+
+
+def latest_channel(late: Mapping[str, tuple[float, ...]]) -> tuple[str, float, float]:
+    """Return the channel whose timing explains most of what a fit leaves.
 
     Parameters
     ----------
     late : Mapping[str, tuple of float]
-        By channel, its apparent delay [s] and the gain, see `lateness`.
+        By channel, its apparent delay [s] and the gain, see `lateness`, and what may follow.
 
     Returns
     -------
@@ -118,5 +191,29 @@ def latest_channel(late: Mapping[str, tuple[float, float]]) -> tuple[str, float,
         Channel; delay [s], negative for a lead; and the gain in log-likelihood [dimensionless]. The gain is zero if no
         channel is tested, or if the delay is too short or too long to be believed.
     """
-    channel, (behind, gain) = max(late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
+    channel, (behind, gain, *_) = max(late.items(), key=lambda one: one[1][1], default=("", (0.0, 0.0)))
     return channel, behind, gain if LEAST_LATE < abs(behind) < LATEST else 0.0
+
+
+def omitted_delay_doubt(late: Delays) -> float:
+    """Return the doubt of bulk modulus from a delay that no fit includes, though it is hardly chance.
+
+    A delay is fitted from a gain of 10 on, so one of four deviations is left out. Where oil leaks off within
+    milliseconds, a lag of the pressure looks like softer oil.
+
+    Parameters
+    ----------
+    late : Delays
+        The apparent delays.
+
+    Returns
+    -------
+    float
+        The largest such change; 0 if all gains may be chance [fraction].
+
+    Examples
+    --------
+    >>> omitted_delay_doubt({"position_m": (2e-4, 1.5, 0.3), "differential_pressure_pa": (7e-4, 9.0, -0.08)})
+    0.08
+    """
+    return max((abs(change) for _, gain, change in late.values() if gain > BY_CHANCE), default=0.0)

@@ -130,7 +130,7 @@ class GreyBoxLog:
     block : float
         Length over which residuals are averaged before they are squared [s].
     timed : tuple of str
-        Driving channels whose delay a fit tests.
+        Channels whose delay a fit tests.
     counts : tuple of int
         Tooth counts of the pump that a fit tests, see `estimation.fits.greybox.pump_ripple`.
     teeth : tuple of Ripple

@@ -3,10 +3,15 @@
 See decision 311.
 """
 
+import math
+
 from plant.eha.model import EhaParameters
 from plant.eha.scales import PAPER_RIG, friction_scales, leakage_scales
 
-FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (12.5, 6.0))
+WORST_LEAKAGE = 12.5
+"""Worst leakage of Table 3 over the healthy one, rounded [dimensionless]."""
+
+FAULTS_TRIED = ((1.0, 1.0), (5.0, 6.0), (WORST_LEAKAGE, 6.0))
 """Leakage and flow bias of the starts, as multiples of the healthy paper rig's: the spread of Table 3."""
 
 LEAST_LEAKAGE = 1e-3
@@ -64,3 +69,31 @@ def faulty_coefficient(p: EhaParameters, name: str, healthy: float, factor: floa
     """
     scales = {**leakage_scales(p), **friction_scales(p)}
     return healthy + (factor - 1.0) * scales[name] * float(getattr(PAPER_RIG, name))
+
+
+def leakage_range(p: EhaParameters) -> float:
+    """Return how far the worst leakage of an actuator is from its healthy one, over the same on the paper's rig.
+
+    What goes with leakage, such as the drain of a worn pump, may be as many deviations from its healthy value on a
+    tight actuator as on the paper's.
+
+    Parameters
+    ----------
+    p : EhaParameters
+        The healthy actuator.
+
+    Returns
+    -------
+    float
+        Ratio of the logarithms, 1 or more [dimensionless].
+
+    Examples
+    --------
+    >>> leakage_range(EhaParameters()), round(leakage_range(EhaParameters(leakage_coefficient=1e-13)), 2)
+    (1.0, 2.49)
+    """
+    worst = (
+        math.log(faulty_coefficient(one, "leakage_coefficient", healthy, WORST_LEAKAGE) / healthy)
+        for one, healthy in ((p, leakage_guess(p)), (PAPER_RIG, PAPER_RIG.leakage_coefficient))
+    )
+    return max(next(worst) / next(worst), 1.0)

@@ -161,7 +161,7 @@ def what_is_asked_of_residuals() -> dict[str, Any]:
     told: dict[str, Any] = {}
     for name, one in {"flow": problem(), "held": problem(HELD_FLOW_FORM)}.items():
         theta = usual(one)
-        known, changes = residuals_and_changes(one, theta)
+        known, changes = residuals_and_changes(one, theta, one.residuals(theta))
         assert known is not None
         errors = one.residuals(theta).ravel()
         told[name] = {
@@ -186,13 +186,17 @@ def what_is_asked_of_residuals() -> dict[str, Any]:
         "play, that is hardly felt": shown_as(play.shown_play(small, np.array([-3.0, 1.0, 2.0]), left_of)),
         "play, hardly along": shown_as(play.shown_play(made, 0.01 * np.array([-3.0, 1.0, 2.0]), left_of)),
         "nudges [s]": LATE_NUDGE,
-        "of one that is not asked": residuals_and_changes(replace_log(timed=()), usual(problem()))[1],
+        "of one that is not asked": _changes(replace_log(timed=())),
     }
     long = replace_log(block=12.0 * problem().log.sample_time)
-    told["four samples on either side"] = [some(one) for one in residuals_and_changes(long, usual(long))[1]]
+    told["four samples on either side"] = [some(one) for one in _changes(long)]
     short = replace_log(sample_time=3.0 * problem().log.block)
-    told["one sample a block"] = [some(one) for one in residuals_and_changes(short, usual(short))[1]]
+    told["one sample a block"] = [some(one) for one in _changes(short)]
     return told
+
+
+def _changes(one: Any) -> Any:
+    return residuals_and_changes(one, usual(one), one.residuals(usual(one)))[1]
 
 
 def replace_log(**changed: Any) -> Any:

@@ -208,3 +208,15 @@ def test_speeds_missing_at_an_end_of_a_log_are_uncertain_by_half_the_adjacent_sl
     volume = 0.5 * (0.5 * 10.0 * 4) * 3 * at * HEALTHY.pump_displacement
     variance = (HEALTHY.bulk_modulus / HEALTHY.chamber_volume * volume) ** 2 / 4
     assert gaps.tolist() == [[0.0, 3.0, pytest.approx(variance)], [n - 3.0, n - 1.0, pytest.approx(variance)]]
+
+
+def test_a_drain_is_doubted_as_far_as_leakage_reaches() -> None:
+    """A worn pump of a tight actuator drains hundreds of times as much as a sound one; the paper's, twelve times."""
+    record, _ = log("normal", 0, 1.0)
+    variances = dict.fromkeys((*FLOW_FORM.drives, *FLOW_FORM.outputs), 1e-6)
+    usual, tight = (
+        flow_log(record, replace(HEALTHY, leakage_coefficient=share * HEALTHY.leakage_coefficient), {}, variances)
+        for share in (1.0, 0.02)
+    )
+    assert usual.presumed["case_leakage"][1] == 1.0
+    assert 2.0 < tight.presumed["case_leakage"][1] < 3.0
