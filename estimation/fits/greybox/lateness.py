@@ -6,7 +6,6 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.finding import NORMAL_95
 from estimation.fits.greybox.deviations import Information
 from estimation.fits.greybox.play import ShownPlay, crossed_drives, shown_play
 from estimation.fits.greybox.problem import Problem
@@ -21,9 +20,10 @@ LATE_NUDGE = 1e-5
 """Time by which a channel is shifted for the finite difference [s]."""
 
 LEAD = "speed_lead"
+"""The motor's lead between samples, which is not negative."""
 
-BY_CHANCE = 0.5 * NORMAL_95**2
-"""Gain in log-likelihood that the delay of a channel on time exceeds in one log of twenty [dimensionless]."""
+BY_CHANCE = 0.5 * 2.39**2
+"""Gain in log-likelihood that one of three channels on time exceeds in one log of twenty [dimensionless]."""
 
 
 Delays: TypeAlias = dict[str, tuple[float, float, float]]
@@ -145,7 +145,7 @@ def late_and_play(
     left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
     names = [problem.model.unknowns[place] for place in known_of.felt]
 
-    # the motor's lead is not negative, and may not take up a late pressure in place of bulk modulus
+    # what a lead below zero would take up of a late pressure is left to bulk modulus
     held = np.array([name != LEAD for name in names]) & told
     bread, slopes = known_of.fitted_bread, known_of.fitted_slopes[:, held]
     softened = np.zeros(len(names))

@@ -106,7 +106,7 @@ def made_fit(
         (chi,),
         (correlated,),
         {},
-        {SPEED: (late, gain), POSITION: (0.0, 0.1)},
+        {SPEED: (late, gain, 0.0), POSITION: (0.0, 0.1, 0.0)},
     )
 
 

@@ -165,7 +165,7 @@ def told_of(fit: GreyBoxFit) -> dict[str, Any]:
         "autocorrelation": fit.autocorrelation[0],
         "slopes of bulk modulus by the rig": {name: slope["bulk_modulus"] for name, slope in fit.rig_slopes.items()},
         "late [s]": {
-            name: Found(late, abs(late) / max(2.0 * gain, 1e-9) ** 0.5) for name, (late, gain) in fit.late.items()
+            name: Found(late, abs(late) / max(2.0 * gain, 1e-9) ** 0.5) for name, (late, gain, _) in fit.late.items()
         },
     }
 

@@ -97,4 +97,4 @@ def test_a_lag_that_looks_like_soft_oil_is_within_the_interval(frequency: float,
 
 def test_a_delay_that_may_be_chance_is_no_doubt() -> None:
     assert omitted_delay_doubt({}) == 0.0
-    assert omitted_delay_doubt({SPEED: (3e-4, 1.9, 0.2), PRESSURE: (2e-4, 2.0, -0.1)}) == 0.1
+    assert omitted_delay_doubt({SPEED: (3e-4, 2.8, 0.2), PRESSURE: (2e-4, 3.0, -0.1)}) == 0.1
