@@ -80,11 +80,6 @@ class Hypothesis:
     lower: bool = False
     known: tuple[str, ...] = ()
 
-    @property
-    def times(self) -> bool:
-        """Whether it moves the channel `late` in time."""
-        return any(name.endswith("_lag") for name in self.free)
-
     def told(self, values: Mapping[str, float], std: Mapping[str, float]) -> bool:
         """Return whether a log determines the parameters that the hypothesis needs.
 

@@ -128,7 +128,7 @@ def hypothesis_problem(log: GreyBoxLog, together: Sequence[Hypothesis], *more: s
     plain = form_with_relief(FLOW_FORM) if relieved else FLOW_FORM
     held = {name for one in together for name in one.instead}
     known = [name for name in plain.unknowns if name not in held]
-    late = {one.late for one in together if one.times}
+    late = {one.late for one in together if any(name.endswith("_lag") for name in one.free)}
     log = replace(log, timed=tuple(channel for channel in log.timed if channel not in late))
     form = FORMS[FILTER_TIME in extra, LEAKAGE_TURBULENT.free[0] in extra, QUICKNESS in extra]
     free = tuple(dict.fromkeys((*known, *extra)))
