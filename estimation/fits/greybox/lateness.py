@@ -140,6 +140,11 @@ def late_and_play(
         Changes of the residuals, see `residuals_and_changes`; empty if no channel is tested [dimensionless].
     told : ndarray of bool, shape (unknowns,)
         Whether the log determines each unknown at all.
+
+    Returns
+    -------
+    tuple of (Delays, ShownPlay)
+        Apparent delays by channel, and the play.
     """
     timed, left_over = problem.log.timed, known_of.left_over
     left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
@@ -204,7 +209,7 @@ def omitted_delay_doubt(late: Delays) -> float:
     Parameters
     ----------
     late : Delays
-        The apparent delays.
+        The apparent delays [s], their gains and changes [dimensionless].
 
     Returns
     -------
