@@ -252,6 +252,6 @@ def test_a_model_is_validated_separately_on_both_sides_of_a_gap_of_its_input(tmp
     model = hs.read(tmp_path / "whole.csv").identify(input="coil", output="gap", order=1, delay=1)
     with pytest.warns(LogWarning, match="coil is missing in 15"):
         holed = hs.read(tmp_path / "holed.csv")
-    with pytest.warns(LogWarning, match="2 experiments"):
+    with pytest.warns(LogWarning, match="experiments: 2"):
         tested = model.validate(holed)
     assert tested.loc["gap", "fit_percent"] == pytest.approx(model.fit_percent, abs=1.0)

@@ -43,7 +43,6 @@ from experiments.identification.options import (
 )
 from experiments.identification.simulate_model import simulate_model
 from plant.errors import HydrostateError
-from plant.log.columns import TIME
 
 commands = typer.Typer()
 
@@ -96,7 +95,7 @@ def identify(
     }
     related = any(one is not None for one in (inputs, outputs, references, simulate))
     mapping = load_columns(columns)
-    time = mapping[TIME] if set(mapping) == {TIME} else None
+    time = mapping["time_s"] if set(mapping) == {"time_s"} else None
     if (related and rig is None and (not mapping or time)) or structure in ONLY_BETWEEN_COLUMNS:
         of_channels = {"--rig": rig, "--columns": None if time else columns, "--filter-hz": filter_hz}
         refuse_ineffective_options(

@@ -186,7 +186,7 @@ def test_fitting_a_log_imports_no_filters(tmp_path: Path) -> None:
         (["identify", "a.csv", "--rig", "r.toml", "--simulate", "m.json"], "--simulate goes with --input and --output"),
         (["identify", "a.csv", "--input", "u", "--output", "y", "--filter-hz", "9"], "--filter-hz does not go with"),
         (["identify", "a.csv", "--simulate", "m.json", "--validate", "b.csv"], "--validate goes with a fit"),
-        (["identify", "a.csv", "--columns", "a=b", "--output", "u,y"], "--output takes one channel with --rig"),
+        (["identify", "a.csv", "--columns", "position_m=b", "--output", "u,y"], "--output takes one channel with"),
         (["identify", "a.csv", "--figure", "none/a.png"], "--figure none/a.png: there is no such folder"),
         (["diagnose", "a.csv", "--report", "none/a.html"], "--report none/a.html: there is no such folder"),
         (["inspect", "a.csv", "--report", "none/a.html"], "--report none/a.html: there is no such folder"),

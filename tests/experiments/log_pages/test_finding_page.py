@@ -73,7 +73,7 @@ MEASURE = EstimateCode.KNOWN_AS_THE_RIG.note(entry="chamber_volume", percent=91.
 def test_what_to_measure_and_to_describe_is_among_what_to_do() -> None:
     page = page_of("paper", notes=(MEASURE,))
     to_do = page.split('<ol class="todo">')[1].split("</ol>")[0]
-    assert "<li>Measure chamber_volume: " in to_do
+    assert "<li>Measure chamber_volume, and list it under measured in the rig file: " in to_do
     assert '<li class="screen-only">Describe your actuator in a rig file' in to_do
     assert page.count("Measure chamber_volume") == 1
     assert "Describe your actuator" not in page_of("P-12", notes=(MEASURE,))

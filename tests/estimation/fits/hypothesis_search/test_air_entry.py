@@ -79,4 +79,5 @@ def test_air_entry_is_identified_with_its_time_and_bulk_modulus_is_right(at: flo
     assert fit.explanation.values["air_width"][0] == pytest.approx(lasting / 5.0, rel=0.1)
     value, std = fit.parameters["bulk_modulus"]
     assert abs(value - MACHINE.bulk_modulus) < std
-    assert 2e-3 < std / value < 3e-3  # the rate at which bubbles yield is not known
+    # the rate at which bubbles yield is not known; in the first log a delay that is hardly chance is doubted as well
+    assert 2e-3 < std / value < 4e-3

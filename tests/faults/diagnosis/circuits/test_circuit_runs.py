@@ -118,7 +118,7 @@ def test_a_pressure_in_every_few_rows_is_interpolated_linearly_and_averaged_over
 
 
 def test_a_log_of_a_few_samples_is_refused() -> None:
-    with pytest.raises(LogError, match=r"a log of 0\.2 s or more, got 0\.049 s"):
+    with pytest.raises(LogError, match=r"the log lasts 0\.049 s, but a diagnosis needs 0\.2 s or more"):
         blocks_of(Record(1e-3, {"motor_speed_rad_s": SPEED[:50], "velocity_m_s": SPEED[:50]}))
 
 
