@@ -145,6 +145,12 @@ class IdentificationCode(Code):
         "filtered or held sensor noise). Poles and gain may be those of an approximation; --structure auto tries "
         "nonlinear models"
     )
+    MODEL_TOO_SMALL = (
+        "the model leaves {left:.0%} of the deviation of {output!r}, and a linear filter of the inputs explains "
+        "{explained:.0%} of the variance of that: the model is too small, and its poles and gain are less certain than "
+        "their intervals say. Give a higher --order. A sweep drives each frequency only once: a drive that has all "
+        "frequencies throughout shows better which order is needed"
+    )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
         "long to be judged (a model with this delay leaves {left:.0%} of the error): try --delay {samples}, or a "

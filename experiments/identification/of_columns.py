@@ -213,7 +213,11 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
     for result in results:
         if result["outcome"] == "mismatch":
             yield f"Do not use the model of {result['output']} (outcome mismatch): see the warning above."
-        told = (IdentificationCode.MORE_THAN_NOISE, IdentificationCode.ERROR_MODELLED)
+        told = (
+            IdentificationCode.MORE_THAN_NOISE,
+            IdentificationCode.MODEL_TOO_SMALL,
+            IdentificationCode.ERROR_MODELLED,
+        )
         yield from (note["text"] for note in result["notes"] if note["code"] in told)
     yield (
         f"From {', '.join(results[0]['inputs'])}. Fits are of free runs: on the fitted logs, on blocks held back from "

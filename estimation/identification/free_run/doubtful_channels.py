@@ -30,6 +30,10 @@ INPUT_LAGS, OTHER_SHIFTS, SAMPLES_EACH = (0, 2, 6, 18), 39, 4
 """Lags in samples of functions of inputs that may explain the residual, number of other shifts that are tried (one
 given in advance beats them all by chance in 2.5 %), and least samples per column [count]."""
 
+FILTER_LAGS, MOST_FILTERED, MISSED_SHARE = 50, 20_000, 0.5
+"""Coefficients of a filter of the inputs that may explain the residual, and most samples that it is fitted to [count];
+share of the residual's variance that it explains from which the model is called too small [fraction]; judged."""
+
 DECISIVE_SHARE = 0.5
 """Share of a model's squared error above which a few outputs decide the fit [fraction]."""
 
@@ -98,9 +102,12 @@ def _free_runs(model: FreeRunModel, data: Channels) -> list[Array]:
 
 
 def residual_notes(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note if the residual is large, more than noise from sample to sample, and depends on the inputs.
+    """Return a note if the residual is large and depends on the inputs.
 
-    Filtered or held sensor noise is correlated from sample to sample too, so the residual must also follow the inputs.
+    If it is more than noise from sample to sample, functions of the inputs may explain it; filtered or held sensor
+    noise is correlated from sample to sample too, so it must follow them. If it is as fast as noise, a linear filter of
+    the inputs must explain it: a sweep drives each frequency once, so held-back blocks do not show what a small model
+    misses.
     """
     runs = _free_runs(model, data)
     begins = [model.dynamics.undetermined_outputs(y.size) for y in data.y]
@@ -113,12 +120,36 @@ def residual_notes(model: FreeRunModel, data: Channels) -> list[Note]:
         return []
     total, noise = float(known.std()), float(changes.std()) / 2.0**0.5
     share = total / float(np.nanstd(np.concatenate(data.y)))
-    if not (share > LARGE_RESIDUAL and noise < NOISE_SHARE * total):
+    if not share > LARGE_RESIDUAL:
         return []
+    if noise >= NOISE_SHARE * total:
+        explained = _explained_by_filter(left, [u[begin:] for u, begin in zip(data.u, begins, strict=True)])
+        told = IdentificationCode.MODEL_TOO_SMALL.note(output=data.output, left=share, explained=explained)
+        return [told] if explained > MISSED_SHARE else []
     drives = [np.column_stack([run, u])[begin:] for run, u, begin in zip(runs, data.u, begins, strict=True)]
     if not depends_on_signals(np.concatenate(left), np.concatenate(drives)):
         return []
     return [IdentificationCode.MORE_THAN_NOISE.note(output=data.output, left=share)]
+
+
+def _explained_by_filter(left: list[Array], inputs: list[Array]) -> float:
+    """Return the share of a residual's variance that a filter of the inputs explains, less what chance explains."""
+    lags = max(1, FILTER_LAGS // inputs[0].shape[1])
+    rows, wanted = list[Array](), list[Array]()
+    for one, u in zip(left, inputs, strict=True):
+        if one.size > lags:
+            rows.append(np.column_stack([u[lags - k : u.shape[0] - k] for k in range(lags)]))
+            wanted.append(one[lags:])
+    if not rows:
+        return 0.0
+    columns, aims = np.concatenate(rows)[:MOST_FILTERED], np.concatenate(wanted)[:MOST_FILTERED]
+    known = np.isfinite(aims)
+    columns, aims = columns[known] - columns[known].mean(axis=0), aims[known] - aims[known].mean()
+    freedom = aims.size - columns.shape[1] - 1
+    if freedom < columns.shape[1]:
+        return 0.0
+    missed = aims - columns @ np.linalg.lstsq(columns, aims, rcond=1e-9)[0]
+    return 1.0 - float(missed @ missed) / freedom / (float(aims @ aims) / (aims.size - 1))
 
 
 def wandering_notes(model: FreeRunModel, data: Channels) -> list[Note]:

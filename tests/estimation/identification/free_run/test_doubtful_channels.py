@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from estimation.identification.free_run.data import Channels, Scaling, channels_from
 from estimation.identification.free_run.doubtful_channels import (
@@ -113,6 +114,22 @@ def with_noise(kind: str, seed: int, n: int = 800) -> set[object]:
 def test_filtered_or_held_sensor_noise_is_not_taken_for_a_nonlinear_plant(kind: str) -> None:
     for seed in range(20, 24):
         assert IdentificationCode.MORE_THAN_NOISE not in with_noise(kind, seed)
+
+
+@pytest.mark.parametrize(("order", "told"), [(None, True), (4, False)])
+def test_a_model_that_is_too_small_for_a_sweep_is_noted(order: int | None, told: bool) -> None:
+    """Held-back blocks of a sweep each have frequencies that no other has, so they prefer a model that is too small."""
+    rng = np.random.default_rng(5)
+    u = np.sin(np.cumsum(2.0 * np.pi * np.linspace(0.002, 0.3, 4000)))
+    first, second = (np.array([1.0, 5.0, 900.0]), np.array([1.0, 10.0, 6000.0]))  # modes at 30 and 77 rad/s
+    numerator, denominator, _ = cont2discrete(([540.0, 2160.0, 1.35e6], np.polymul(first, second)), 0.01, "zoh")
+    y = filtered(numerator.ravel(), denominator, u)
+    data = channels_from([u[:, None]], [y + 0.1 * y.std() * rng.normal(size=u.size)], 0.01, ["u"], "y")
+    found = identify_channels(data, order=order)
+    notes = {note.code: note.data for note in found.notes}
+    assert (IdentificationCode.MODEL_TOO_SMALL in notes) is told
+    if told:
+        assert notes[IdentificationCode.MODEL_TOO_SMALL]["explained"] > 0.5
 
 
 @pytest.mark.parametrize("every", [1, 3])
