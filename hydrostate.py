@@ -195,7 +195,7 @@ def read(
     from experiments.python_user.log import ANY
     from experiments.python_user.reading import read_whole_or_sparse
     from plant.errors import NoChannelError
-    from plant.log.any_columns import read_any
+    from plant.log.any_columns import read_any, time_alone
     from plant.log.frames import by_name, frame_table, is_frame
 
     with options_by_name():
@@ -231,7 +231,7 @@ def read(
             )
         name = kind.name
     except NoChannelError as error:
-        time = columns["time_s"] if columns is not None and set(columns) == {"time_s"} else None
+        time = time_alone(columns)
         if rig is not None or (columns is not None and time is None) or plant is not None or others:
             raise
         kinds = kinds_by_columns(error.columns)

@@ -166,7 +166,7 @@ class Jobs:
         with self._lock:
             taken_back = self._waiting.get(log.id) is not future
         if taken_back:
-            self._delete_files(log.id)
+            self.delete_files(log.id)
             return
         try:
             worked: LogResult = future.result()
@@ -195,7 +195,7 @@ class Jobs:
         state = FAILED if worked.result["outcome"] == "failed" else DONE
         self._store.finish(log.id, state, worked.result, worked.entries, worked.said)
         if self._store.get(log.id) is None:
-            self._delete_files(log.id)
+            self.delete_files(log.id)
         phase_file(self._settings, log.id).unlink(missing_ok=True)
         with self._lock:
             self._waiting.pop(log.id, None)
@@ -220,7 +220,8 @@ class Jobs:
         entries = {"outcome": "failed", "reason": message} if log.verb == "diagnose" else None
         return LogResult({"file": log.name, "outcome": "failed", "message": message}, entries)
 
-    def _delete_files(self, identity: str) -> None:
+    def delete_files(self, identity: str) -> None:
+        """Delete a log with its page and the step of the work on it."""
         for path in (log_file, page_file, phase_file):
             path(self._settings, identity).unlink(missing_ok=True)
 

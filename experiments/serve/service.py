@@ -12,7 +12,7 @@ from pebble import ProcessExpired
 from experiments.log_pages.comparison import compare_view
 from experiments.running.refusal import os_errors_as
 from experiments.serve.fleet_view import Repairs, actuator_view, fleet_view
-from experiments.serve.jobs import BusyError, Jobs, log_file, page_file, phase_file
+from experiments.serve.jobs import BusyError, Jobs, log_file, page_file
 from experiments.serve.limits import FreeSpace, RefusedError
 from experiments.serve.live import Stream, Streams
 from experiments.serve.settings import Settings
@@ -180,8 +180,7 @@ class Service:
 
     def _delete_files(self, identity: str) -> None:
         self.jobs.cancel(identity)
-        for place in (log_file, page_file, phase_file):
-            place(self.settings, identity).unlink(missing_ok=True)
+        self.jobs.delete_files(identity)
 
     def stream(self, name: str) -> Stream:
         """Return a stream.

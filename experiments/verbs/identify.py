@@ -94,8 +94,10 @@ def identify(
         "report": report,
     }
     related = any(one is not None for one in (inputs, outputs, references, simulate))
+    from plant.log.any_columns import time_alone
+
     mapping = load_columns(columns)
-    time = mapping["time_s"] if set(mapping) == {"time_s"} else None
+    time = time_alone(mapping)
     if (related and rig is None and (not mapping or time)) or structure in ONLY_BETWEEN_COLUMNS:
         of_channels = {"--rig": rig, "--columns": None if time else columns, "--filter-hz": filter_hz}
         refuse_ineffective_options(

@@ -123,6 +123,17 @@ def read_any(
     return Record(checked.sample_time, kept, start_time=checked.start_time)
 
 
+def time_alone(columns: Mapping[str, str] | None) -> str | None:
+    """Return the column of time, if a user names that channel and no other.
+
+    Examples
+    --------
+    >>> time_alone({"time_s": "T_MS:ms"}), time_alone({"time_s": "T", "position_m": "X:mm"}), time_alone(None)
+    ('T_MS:ms', None, None)
+    """
+    return columns[TIME] if columns is not None and set(columns) == {TIME} else None
+
+
 def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
     """Return the table that holds most of the wanted columns, or the most columns."""
 

@@ -35,9 +35,9 @@ def residuals_and_changes(problem: Problem, theta: Array, errors: Array) -> tupl
     """Return the residuals under the log's drives, with one model step per sample, and their changes by other drives.
 
     The other drives are each tested channel, shifted a little, and the courses of an encoder play. A pressure that is
-    late is the same log as drives that are all early. Where make-up valves
-    fill a small chamber within a sample, such steps chatter, and a small shift seems to change the run by far more than
-    noise: no delay could be seen then. So the changes have the problem's own steps there.
+    late is the same log as drives that are all early. The changes have the problem's own steps: where make-up valves
+    fill a small chamber within a sample, steps of a sample chatter, and a small shift seems to change the run by far
+    more than noise, so that no delay could be seen.
 
     Parameters
     ----------
@@ -154,9 +154,9 @@ def late_and_play(
     held = np.array([name != LEAD for name in names]) & told
     bread, slopes = known_of.fitted_bread, known_of.fitted_slopes[:, held]
     softened = np.zeros(len(names))
-    if "bulk_modulus" in names and held[names.index("bulk_modulus")]:
+    if "bulk_modulus" in names and held[place := names.index("bulk_modulus")]:
         kept = np.linalg.inv(np.linalg.inv(bread)[np.ix_(held, held)])
-        softened[held] = kept[np.count_nonzero(held[: names.index("bulk_modulus")])]
+        softened[held] = kept[np.count_nonzero(held[:place])]
 
     def taken(one: Array) -> Iterable[tuple[str, float]]:
         return zip(names, known_of.response(one), strict=False)

@@ -4,6 +4,8 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.lagged_columns import columns_of
+from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.random_walk import (
     FEWEST,
@@ -134,20 +136,16 @@ def residual_notes(model: FreeRunModel, data: Channels) -> list[Note]:
 
 def _explained_by_filter(left: list[Array], inputs: list[Array]) -> float:
     """Return the share of a residual's variance that a filter of the inputs explains, less what chance explains."""
-    lags = max(1, FILTER_LAGS // inputs[0].shape[1])
-    rows, wanted = list[Array](), list[Array]()
-    for one, u in zip(left, inputs, strict=True):
-        if one.size > lags:
-            rows.append(np.column_stack([u[lags - k : u.shape[0] - k] for k in range(lags)]))
-            wanted.append(one[lags:])
-    if not rows:
-        return 0.0
-    columns, aims = np.concatenate(rows)[:MOST_FILTERED], np.concatenate(wanted)[:MOST_FILTERED]
+    count = inputs[0].shape[1]
+    lags = max(1, FILTER_LAGS // count)
+    form = Form(0, (lags,) * count, (0,) * count)
+    columns = np.concatenate([columns_of(form, u)[lags:] for u in inputs])[:MOST_FILTERED]
+    aims = np.concatenate([one[lags:] for one in left])[:MOST_FILTERED]
     known = np.isfinite(aims)
-    columns, aims = columns[known] - columns[known].mean(axis=0), aims[known] - aims[known].mean()
-    freedom = aims.size - columns.shape[1] - 1
+    freedom = int(np.count_nonzero(known)) - columns.shape[1] - 1
     if freedom < columns.shape[1]:
         return 0.0
+    columns, aims = columns[known] - columns[known].mean(axis=0), aims[known] - aims[known].mean()
     missed = aims - columns @ np.linalg.lstsq(columns, aims, rcond=1e-9)[0]
     return 1.0 - float(missed @ missed) / freedom / (float(aims @ aims) / (aims.size - 1))
 

@@ -31,11 +31,10 @@ def is_version_4(content: bytes) -> bool:
     (True, False)
     """
     try:
-        _, kind, rows, columns, imaginary, name = _header(content, 0)
+        *_, imaginary, name = _header(content, 0)
     except DamagedMatError:
         return False
-    plain = kind % 10 <= SPARSE and min(rows, columns) >= 0
-    return plain and imaginary in (0, 1) and 1 < name <= LONGEST_NAME and HEADER + name <= len(content)
+    return imaginary in (0, 1) and name > 1 and HEADER + name <= len(content)
 
 
 def read_variables_of_version_4(content: bytes) -> dict[str, MatValue]:
@@ -57,8 +56,6 @@ def read_variables_of_version_4(content: bytes) -> dict[str, MatValue]:
     while at < len(content):
         order, kind, rows, columns, imaginary, named = _header(content, at)
         tens, use = divmod(kind, 10)
-        if tens >= len(NUMBERS) or use > SPARSE or min(rows, columns) < 0 or not 0 < named <= LONGEST_NAME:
-            raise DamagedMatError(f"no variable of version 4 begins at byte {at}")
         at += HEADER
         name = content[at : at + named].split(b"\0", 1)[0].decode("latin-1")
         at += named
@@ -86,8 +83,9 @@ def _header(content: bytes, at: int) -> tuple[str, int, int, int, int, int]:
     for order in "<>":
         kind, *sizes = struct.unpack_from(f"{order}5i", content, at)
         kind -= 0 if order == "<" else 1000
-        if 0 <= kind <= LARGEST_KIND:
-            rows, columns, imaginary, name = sizes
+        rows, columns, imaginary, name = sizes
+        plain = 0 <= kind <= LARGEST_KIND and kind % 10 <= SPARSE
+        if plain and min(rows, columns) >= 0 and 0 < name <= LONGEST_NAME:
             return order, kind, rows, columns, imaginary, name
     raise DamagedMatError(f"no variable of version 4 begins at byte {at}")
 

@@ -149,7 +149,8 @@ def test_only_a_client_that_does_not_read_its_answer_is_disconnected(reads: bool
     assert asyncio.run(said()).aborted is not reads
 
 
-def test_a_malformed_body_is_refused_and_the_application_gets_a_disconnect() -> None:
+def listener() -> tuple[Heard, Any]:
+    """Return what an application hears, and the application, which reads a body until the client leaves."""
     heard: Heard = []
 
     async def listens(_: Any, receive: Any, send: Any) -> None:
@@ -157,6 +158,12 @@ def test_a_malformed_body_is_refused_and_the_application_gets_a_disconnect() -> 
         while (message := await receive())["type"] != "http.disconnect":
             heard.append("body")
         heard.append(message["type"])
+
+    return heard, listens
+
+
+def test_a_malformed_body_is_refused_and_the_application_gets_a_disconnect() -> None:
+    heard, listens = listener()
 
     async def said() -> Wire:
         protocol, wire = connected(listens)
@@ -277,13 +284,7 @@ def test_a_client_that_waits_for_no_answer_is_disconnected_when_it_stops_sending
 
 
 def test_a_body_that_is_cut_off_is_refused_and_the_application_gets_a_disconnect() -> None:
-    heard: Heard = []
-
-    async def listens(_: Any, receive: Any, send: Any) -> None:
-        del send
-        while (message := await receive())["type"] != "http.disconnect":
-            heard.append("body")
-        heard.append(message["type"])
+    heard, listens = listener()
 
     async def said() -> tuple[bool, Wire]:
         protocol, wire = connected(listens)
