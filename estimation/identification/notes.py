@@ -90,6 +90,15 @@ class IdentificationCode(Code):
         "the inputs, now and up to {earlier:.3g} s earlier: {left:.0%} of the error on held-back data is left. "
         "Simulations include this polynomial; transfer function, poles and gain do not"
     )
+    ERROR_MODEL_LEFT_OUT = (
+        "the polynomial that predicts the error of the {structure} model of {output!r} was left out, because these "
+        "inputs do not determine it: fit a log with inputs like these too"
+    )
+    VALIDATED_WORSE = (
+        "the model leaves {left:.0%} of the deviation of {output!r} in {logs}, but {held_back:.0%} in blocks of the "
+        "fitted logs that were held back. The logs differ in drive, operating point or plant: do not rely on the model "
+        "in such logs, or fit logs of both kinds together"
+    )
     NO_NONLINEARITY = (
         "neither dead zone nor saturation nor backlash at the input predicts {output!r} better on held-back data: the "
         "linear model was chosen"

@@ -151,7 +151,10 @@ def _output_result(
             held = channels_of(tests, fit.inputs, output, found.model.sample_time, split=True)
         except HydrostateError as wrong:
             raise HydrostateError(f"{named}: {wrong}") from wrong
-        test = {"files": [str(one) for one in fit.validate], **quality_of(found.model, held, named)}
+        test = {
+            "files": [str(one) for one in fit.validate],
+            **quality_of(found.model, held, named, found.expected_error),
+        }
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
     data = found.at_one_offset(channels_of(records, fit.inputs, output, fit.resampled))

@@ -1,10 +1,13 @@
 """A model between any channels for Python users: it can be printed, drawn, simulated, tested and saved."""
 
+import warnings
 from collections.abc import Mapping, Sequence
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.python_user.answers import Shown, names_of, refuse
+from plant.errors import LogWarning
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,6 +32,10 @@ class Relation(Shown):
         One for each output.
     entries : sequence of Mapping
         Results for each model by the names of the JSON contract; empty for loaded models.
+    data : sequence of Channels
+        The fitted logs, for each model; empty for loaded models.
+    expected : sequence of float
+        `Identified.expected_error` of each model; empty for loaded models [dimensionless].
     """
 
     def __init__(
@@ -36,8 +43,10 @@ class Relation(Shown):
         models: "Sequence[FreeRunModel]",
         entries: "Sequence[Mapping[str, Any]]" = (),
         data: "Sequence[Channels]" = (),
+        expected: Sequence[float] = (),
     ) -> None:
         self.models, self._entries, self._data = tuple(models), tuple(entries), tuple(data)
+        self._expected = tuple(expected) or (nan,) * len(self.models)
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_") and len(self.models) == 1:
@@ -125,18 +134,22 @@ class Relation(Shown):
         Warns
         -----
         LogWarning
-            As in `simulate`.
+            As in `simulate`, or if the error is clearly larger than on held-back blocks of the fitted logs.
         """
         import pandas as pd
 
+        from estimation.identification.free_run.validation_notes import validation_notes
+
         rows: dict[str, Any] = {}
         records = self._records_of(log)
-        for one in self.models:
+        for one, expected in zip(self.models, self._expected, strict=True):
             if (record := records[one.sample_time]) is None:
                 refuse(f"a Log, a Record or a table with the channels is needed, got {type(log).__name__}")
             part = _channels(one, record, split=True)
             quality, judged = one.judged_quality(part.u, part.y)
             _warn_of_inputs(one, part, judged)
+            for note in validation_notes(one, quality, expected, "the log"):
+                warnings.warn(LogWarning(note), stacklevel=2)
             rows[one.output] = vars(quality)
         return pd.DataFrame.from_dict(rows, orient="index")
 
@@ -277,10 +290,7 @@ def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | 
 def _warn_of_inputs(
     model: "FreeRunModel", data: "Channels", judged: "Sequence[tuple[float, float]] | None" = None
 ) -> None:
-    import warnings
-
     from estimation.identification.free_run.input_range import doubts_about_inputs
-    from plant.errors import LogWarning
 
     for note in doubts_about_inputs(model, data, judged):
         warnings.warn(LogWarning(note), stacklevel=3)
@@ -318,4 +328,5 @@ def identified(records: "Sequence[Record]", inputs: Any, outputs: Any, options: 
     found, data = identify_columns(
         once, sources, targets, references=references, sample_time=sample_time, options=asked
     )
-    return Relation([one.model for one in found], [column_entries(one) for one in found], data)
+    expected = [one.expected_error for one in found]
+    return Relation([one.model for one in found], [column_entries(one) for one in found], data, expected)

@@ -88,8 +88,6 @@ class ErrorModel:
     def corrected(self, u: Array, run: Array) -> Array:
         """Return a free run with its predicted error, or as it is if these inputs do not determine that.
 
-        Fits without one block each show how well it is determined (the jackknife).
-
         Parameters
         ----------
         u : ndarray, shape (n, m)
@@ -102,8 +100,28 @@ class ErrorModel:
         ndarray, shape (n,)
             Output, scaled.
         """
+        found = self.predicted(u, run)
+        return run if found is None else run + found
+
+    def predicted(self, u: Array, run: Array) -> Array | None:
+        """Return the predicted error of a free run, or None if these inputs do not determine it.
+
+        Fits without one block each show how well it is determined (the jackknife).
+
+        Parameters
+        ----------
+        u : ndarray, shape (n, m)
+            Inputs, scaled.
+        run : ndarray, shape (n,)
+            Free run, scaled.
+
+        Returns
+        -------
+        ndarray, shape (n,), or None
+            What the output lies above the run, scaled.
+        """
         if not np.isfinite(run).all():
-            return run
+            return None
         signals = np.clip(np.column_stack([run, u]), *self.ends)
         fits, pieces = np.column_stack([self.values, *self.parts]), -(-run.size // MOST_ROWS)
         found, *others = np.concatenate(
@@ -113,7 +131,7 @@ class ErrorModel:
             ]
         ).T
         apart = jackknife(found, others)
-        return run + found if np.hypot(self.error, apart) < self.plain_error else run
+        return found if np.hypot(self.error, apart) < self.plain_error else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return JSON values."""

@@ -1,12 +1,24 @@
 """`Identified`: a model with the evidence for its choice."""
 
 from dataclasses import dataclass, replace
+from math import nan
 from typing import Any
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
+
+LEVEL_DOES_NOT_HOLD = frozenset(
+    {
+        IdentificationCode.RANDOM_WALK,
+        IdentificationCode.WALK_FOLLOWED,
+        IdentificationCode.OFFSETS_DIFFER,
+        IdentificationCode.TREND,
+    }
+)
+"""Notes by which a free run does not follow the level of another log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +51,13 @@ class Identified:
     sound: bool
     above: tuple[float | Array, ...] = ()
     gain_std: tuple[float, ...] = ()
+
+    @property
+    def expected_error(self) -> float:
+        """Error on logs like the fitted ones, over the output's deviation in these; NaN if their level may differ."""
+        if not LEVEL_DOES_NOT_HOLD.isdisjoint(note.code for note in self.notes):
+            return nan
+        return 1.0 - self.held_back_percent / 100.0
 
     def at_one_offset(self, data: Channels) -> Channels:
         """Return the fitted logs with the model's offset, if each has its own or drifts."""

@@ -98,6 +98,30 @@ def linear_fallback_notes(
     ]
 
 
+def error_model_notes(model: FreeRunModel, data: Channels) -> list[Note]:
+    """Return a note if the error model is left out of the run of a log, because its inputs do not determine it.
+
+    Parameters
+    ----------
+    model : FreeRunModel
+        One without an error model has none.
+    data : Channels
+        In units of the channels; inputs in the model's order.
+
+    Returns
+    -------
+    list of Note
+        One at most.
+    """
+    if model.error_model is None:
+        return []
+    one = in_scale(data, model.scaling)
+    runs = ((u, model.dynamics.run(u, y)) for u, y in zip(one.u, one.y, strict=True))
+    if all(model.error_model.predicted(u, run) is not None for u, run in runs):
+        return []
+    return [IdentificationCode.ERROR_MODEL_LEFT_OUT.note(output=data.output, structure=model.structure)]
+
+
 def doubts_about_inputs(
     model: FreeRunModel,
     data: Channels,
@@ -121,10 +145,13 @@ def doubts_about_inputs(
     -------
     list of Note
         That no log is longer than the dead time, or that a linear model replaces the nonlinear one; otherwise one on
-        each input beyond its range.
+        each input beyond its range, and that the error model is left out.
     """
     if all(model.dynamics.undetermined_outputs(y.size) == y.size for y in data.y):
         dead_time = next(n for n in count(data.longest) if model.dynamics.undetermined_outputs(n + 1) == n)
         told = {"logs": named, "output": data.output, "longest": data.longest, "dead_time": dead_time}
         return [IdentificationCode.NOTHING_ANSWERED.note(**told)]
-    return linear_fallback_notes(model, data, judged) or input_range_notes(model, data)
+    return linear_fallback_notes(model, data, judged) or [
+        *input_range_notes(model, data),
+        *error_model_notes(model, data),
+    ]

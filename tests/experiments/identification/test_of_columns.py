@@ -72,6 +72,20 @@ def test_one_input_gives_a_transfer_function_with_its_uncertainty(logs: list[Pat
     assert "heat" in run(logs[0], "--input", "load", "--output", "heat", "--order", 1, "--delay", 2).stdout
 
 
+def test_a_validation_log_of_another_plant_is_named_beside_what_held_back_blocks_promise(
+    logs: list[Path], tmp_path: Path
+) -> None:
+    other = pd.read_csv(logs[1])
+    other["heat"] = filtered([0.0, 0.0, 0.4], [1.0, -0.8], other["load"])
+    other.to_csv(path := tmp_path / "other.csv", index=False)
+    asked = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 2, "--json")
+    (one,) = json.loads(run(logs[0], *asked, "--validate", path).stdout)
+    (told,) = one["warnings"]
+    assert f"leaves {1.0 - one['test']['fit_percent'] / 100.0:.0%} of the deviation of 'heat'" in told
+    assert "other.csv" in told
+    assert json.loads(run(logs[0], *asked, "--validate", logs[1]).stdout)[0]["warnings"] == []
+
+
 def test_a_test_log_that_is_too_short_is_named(logs: list[Path], tmp_path: Path) -> None:
     short = tmp_path / "short.csv"
     pd.read_csv(logs[1]).head(12).to_csv(short, index=False)

@@ -1,5 +1,6 @@
 """Models between any channels in Python, of one output and of several, fitted and loaded."""
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,18 @@ def test_validation_on_another_log_has_one_row_per_output(both: Relation) -> Non
     assert told["rmse"].to_numpy() == pytest.approx(0.02, rel=0.2)  # the noise is all that is left
 
 
+def test_validation_on_a_log_of_another_plant_warns(both: Relation, tmp_path: Path) -> None:
+    other = record(2)
+    slow = Record(T, {**other.channels, "flow": 2.0 + filtered([0.0, 0.1], [1.0, -0.95], other["valve"])})
+    with pytest.warns(LogWarning, match="of the deviation of 'flow' in the log, but") as said:
+        both.validate(opened(slow))
+    assert len(said) == 1
+    both.save(tmp_path / "model.json")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Relation(load_models(tmp_path / "model.json")).validate(opened(slow))  # the file holds no expected error
+
+
 def test_repeated_rows_are_left_out_of_simulation_and_validation_with_a_warning(both: Relation) -> None:
     once = record(2)
     rows = np.r_[0:220, 200:400]
@@ -198,8 +211,10 @@ def test_inputs_beyond_the_fitted_range_of_a_polynomial_model_give_a_warning() -
     found.simulate(bent(1, 1.0))  # pytest turns a warning into an error
     far = bent(2, 4.0)
     for ask in (found.simulate, found.validate, lambda log: found.simulate(log["valve"])):
-        with pytest.warns(LogWarning, match="input 'valve' ranges from"):
+        with pytest.warns(LogWarning) as said:
             ask(far)
+        assert str(said[0].message).startswith("input 'valve' ranges from")
+        assert len(said) == (2 if ask == found.validate else 1)  # validation also tells of the larger error
 
 
 def test_a_linear_model_that_replaces_a_polynomial_one_gives_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,11 @@ from estimation.identification.free_run.data import Channels, channels_from
 from estimation.identification.free_run.error_model import MOST_CUBED, ErrorModel, error_model_of
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.identify import identify_channels
-from estimation.identification.free_run.input_range import input_range_notes
+from estimation.identification.free_run.input_range import (
+    doubts_about_inputs,
+    error_model_notes,
+    input_range_notes,
+)
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.saved import load_models, save_models
 from estimation.identification.model.recursion import filtered
@@ -107,6 +111,7 @@ def test_an_error_that_fits_without_a_block_do_not_agree_on_is_not_corrected() -
     run = linear_run(u)
     apart = replace(found, parts=found.values + 100.0 * (found.parts - found.values))
     np.testing.assert_array_equal(apart.corrected(u, run), run)
+    assert apart.predicted(u, run) is None
     assert not np.array_equal(found.corrected(u, run), run)
     grown = np.where(np.arange(SAMPLES) > 9, np.nan, run)
     np.testing.assert_array_equal(found.corrected(u, grown), grown)
@@ -174,3 +179,15 @@ def test_a_model_with_an_error_model_is_not_exported_and_warns_of_inputs_beyond_
     (note,) = input_range_notes(model, channels(3.0 * u, y))
     assert note.code == IdentificationCode.INPUT_BEYOND_RANGE
     assert not input_range_notes(model, channels(0.9 * u, y))
+
+
+def test_a_run_without_the_error_model_says_so() -> None:
+    model, (u, y) = identified().model, signals(7)
+    assert model.error_model is not None
+    assert error_model_notes(model, channels(u, y)) == []
+    spread = model.error_model.values + 100.0 * (model.error_model.parts - model.error_model.values)
+    apart = replace(model, error_model=replace(model.error_model, parts=spread))
+    (note,) = error_model_notes(apart, channels(u, y))
+    assert note.code == IdentificationCode.ERROR_MODEL_LEFT_OUT
+    assert doubts_about_inputs(apart, channels(u, y)) == [note]
+    np.testing.assert_array_equal(apart.simulate(u, y), replace(model, error_model=None).simulate(u, y))
