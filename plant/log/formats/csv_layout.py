@@ -330,7 +330,7 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
 def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) -> list[list[str]]:
     """Return the lines right above the data that are as wide as it, from the top.
 
-    Where a delimiter closes every row of data, the header may lack that last, empty cell.
+    A delimiter may close every row of data and not the header, or the header alone.
     """
     found: list[list[str]] = []
     for line in reversed(lines):
@@ -344,6 +344,8 @@ def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bo
             cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]
         if closed and len(cells) == width - 1:
             cells.append("")
+        if len(cells) == width + 1 and not cells[-1]:
+            del cells[-1]
         if len(cells) != width or not any(cells):
             break
         found.insert(0, cells)

@@ -39,6 +39,18 @@ def test_a_delimiter_at_the_end_of_every_row_gives_a_numbered_column() -> None:
     assert names(layout("t;x", "0;1;", "1;2;")) == ["t", "x", "column 3"]
 
 
+@pytest.mark.parametrize("units", [[], ["s,mm,"], ["s,mm"]])
+def test_a_delimiter_at_the_end_of_the_header_alone_loses_no_names(units: list[str]) -> None:
+    made = layout_of_lines(["t,x,", *units, "0,1.5", "1,2.5"], "utf-8", "a.csv")
+    assert [one.name for one in made.headings] == ["t", "x"]
+    assert [one.unit for one in made.headings] == (["s", "mm"] if units else [None, None])
+
+
+def test_names_for_more_columns_than_the_rows_have_are_not_guessed() -> None:
+    made = layout_of_lines(["t,x,v", "0,1.5", "1,2.5"], "utf-8", "a.csv")
+    assert [one.name for one in made.headings] == ["column 1", "column 2"]
+
+
 def test_a_first_row_with_text_cells_is_not_taken_for_the_header() -> None:
     assert layout("t,x,v", "0.0,oops,oops", "0.1,1.5,2.5", "0.2,1.5,2.5").skipped == 1
 
