@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from faults.trend.kalman import Belief, Settings, beliefs, evidence_of
+from faults.trend.kalman import JUMP_PRIOR, Belief, Settings, beliefs, evidence_of
 from plant.arrays import Array
 
 FEWEST, LATEST = 3, 6
@@ -13,9 +13,6 @@ FEWEST, LATEST = 3, 6
 
 JUMP = 4.0
 """Jump of the medians, in standard deviations of a log, at which a change is tried [dimensionless]."""
-
-JUMP_PRIOR = 1.0 / 200.0
-"""Expected number of jumps per log [probability]."""
 
 
 def stretches(

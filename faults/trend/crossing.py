@@ -55,7 +55,9 @@ class Crossing:
         return float(np.mean(self.steps <= steps))
 
 
-def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: float = 1.0) -> Crossing:
+def crossing(
+    belief: Belief, grid: Settings, rng: np.random.Generator, limit: float = 1.0, resting: float = 0.0
+) -> Crossing:
     """Return when the level first reaches the limit.
 
     Parameters
@@ -68,6 +70,8 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
         Source of the futures.
     limit : float
         The limit [dimensionless].
+    resting : float
+        Share of the futures that do not grow, whatever their setting: a jump looks like growth [probability].
 
     Returns
     -------
@@ -78,6 +82,8 @@ def crossing(belief: Belief, grid: Settings, rng: np.random.Generator, limit: fl
     level, slope, curvature = _drawn_states(belief, chosen, rng)
     gone = np.where(level >= limit, 0.0, np.inf)
     bend, wander, jerk = grid.bend[chosen], grid.wander[chosen], grid.jerk[chosen]
+    rests = np.arange(DRAWS) < resting * DRAWS
+    slope, curvature, bend, jerk = (np.where(rests, 0.0, each) for each in (slope, curvature, bend, jerk))
     paces = {stride: _pace_transitions(stride, grid, chosen) for stride in set(STRIDES.tolist())}
     begin = 0.0
     for stride in STRIDES.tolist():

@@ -9,6 +9,7 @@ variance, to which every setting adds ``scatter**2``. Values are scaled so that 
 limit at 1; the unit of time is the usual time between two logs, a count of logs.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from itertools import product
@@ -43,11 +44,18 @@ WANDERS = (0.0, 0.005, 0.02)
 SCATTERS = (0.0, 0.01, 0.03, 0.1)
 """Standard deviation from log to log beyond each log's own [dimensionless]."""
 
+MOST_GROWTH = math.log(1000.0)
+"""Logarithm of the most by which a slope grows by itself between two logs [dimensionless]: after a pause of months no
+digit of a level would be left."""
+
 SMALLEST_GROWTH = 1e-4
 """Relative growth in a step below which growth is taken as zero [fraction]: the neglected terms are as large."""
 
 LEVEL = 1.0
 """Standard deviation of the level before the first log [dimensionless]."""
+
+JUMP_PRIOR = 1.0 / 200.0
+"""Expected number of jumps per log [probability]."""
 
 CLIP_DEVIATIONS = 3.5
 """Limit at which an innovation is clipped, in standard deviations [dimensionless]: one wrong log is not a trend."""
@@ -216,7 +224,7 @@ def _step(step: float, paces: tuple[float, ...]) -> tuple[Array, Array, Array]:
 def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     """Return the transition of level and slope for a growing slope, and the covariance from white noise on the slope.
 
-    The white noise has unit density.
+    The white noise has unit density. Over a long time the growth is slower, so that it is `MOST_GROWTH` in all.
 
     Parameters
     ----------
@@ -234,6 +242,7 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     """
     if pace * step < SMALLEST_GROWTH:  # the limit for small growth; the formulas below would lose all digits
         return np.array([step, 1.0]), _noise_covariance(step, 2)[:2, :2]
+    pace = min(pace, MOST_GROWTH / step)
     once, twice = np.expm1(pace * step) / pace, np.expm1(2.0 * pace * step) / (2.0 * pace)
     # integrals from 0 to the step of expm1(pace t) / pace and exp(pace t): of their squares and of their product
     level, both = (twice - 2.0 * once + step) / pace**2, (twice - once) / pace
@@ -253,22 +262,6 @@ def _noise_covariance(step: float, states: int) -> Array:
 def evidence_of(belief: Belief, grid: Settings) -> float:
     """Return the logarithm of the probability of all logs, marginalised over the settings [dimensionless]."""
     return float(np.logaddexp.reduce(belief.evidence + grid.log_prior))
-
-
-def growth_evidence(belief: Belief, grid: Settings) -> float:
-    """Return the log odds of the logs with a slope against none.
-
-    Without a slope the ratio has mean 1 at any time, so the probability that it ever exceeds 1/a is at most a (Ville,
-    Étude critique de la notion de collectif, 1939).
-
-    Returns
-    -------
-    float
-        Logarithm of the ratio [dimensionless].
-    """
-    with_slope = np.where(grid.growing, belief.evidence + grid.log_prior, -np.inf)
-    without = np.where(grid.growing, -np.inf, belief.evidence + grid.log_prior)
-    return float(np.logaddexp.reduce(with_slope) - np.logaddexp.reduce(without))
 
 
 def moments(now: Belief, grid: Settings, state: int = 0) -> tuple[float, float]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from faults.trend.changes import stretches
 from faults.trend.crossing import Crossing, crossing
-from faults.trend.kalman import Belief, growth_evidence, moments, settings
+from faults.trend.kalman import Belief, moments, settings
+from faults.trend.rest import growth_evidence, jumped_share, rest_evidence
 from plant.arrays import Array
 
 FALSE_ALARMS = 0.01
@@ -58,10 +59,9 @@ class Series:
 
     @cached_property
     def step(self) -> float:
-        """Usual time between logs [unit of the times]."""
-        apart = np.diff(self.times)
-        apart = apart[apart > 0.0]
-        return float(np.median(apart)) if len(apart) else 1.0
+        """Mean time between logs [unit of the times]: the median would be minutes where logs come in bursts."""
+        span = float(self.times[-1] - self.times[0])
+        return span / (len(self.times) - 1) if span > 0.0 else 1.0
 
     @property
     def size(self) -> float:
@@ -83,12 +83,15 @@ class Trend:
         Index of the first log of its stretch, after the last jump or repair.
     belief : Belief
         The belief after the log, on the scale of `faults.trend.kalman`.
+    rest : float
+        Logarithm of the probability of the stretch's logs for a level that rests, or jumped once [dimensionless].
     """
 
     series: Series
     place: int
     begin: int
     belief: Belief
+    rest: float
 
     @property
     def level(self) -> tuple[float, float]:
@@ -104,8 +107,8 @@ class Trend:
 
     @cached_property
     def growing(self) -> float:
-        """Log odds of the logs with growth against without [dimensionless]."""
-        return growth_evidence(self.belief, settings())
+        """Log odds of the logs with growth against rest, with a jump or without [dimensionless]."""
+        return growth_evidence(self.belief, settings(), self.rest)
 
     @property
     def _short(self) -> bool:
@@ -113,7 +116,8 @@ class Trend:
 
     @cached_property
     def _future(self) -> Crossing:
-        return crossing(self.belief, settings(), np.random.default_rng(self.place))
+        resting = jumped_share(self.belief, settings(), self.rest)
+        return crossing(self.belief, settings(), np.random.default_rng(self.place), resting=resting)
 
     @property
     def crossing(self) -> Crossing | None:
@@ -137,10 +141,13 @@ class Trend:
 def trends(series: Series) -> Iterator[Trend]:
     """Yield the trend of a series after each log; later logs are not used."""
     scaled = (series.values - series.healthy) / series.size
+    times, stds = series.times / series.step, series.stds / abs(series.size)
     known = first_logs_after(series.times, series.maintained)
-    parts = stretches(series.times / series.step, scaled, series.stds / abs(series.size), known, settings())
-    for place, (begin, belief) in enumerate(parts):
-        yield Trend(series, place, begin, belief)
+    start, rest = 0, rest_evidence(times, scaled, stds, settings())
+    for place, (begin, belief) in enumerate(stretches(times, scaled, stds, known, settings())):
+        if begin != start:
+            start, rest = begin, rest_evidence(times[begin:], scaled[begin:], stds[begin:], settings())
+        yield Trend(series, place, begin, belief, float(rest[place - start]))
 
 
 def first_logs_after(times: Array, events: Iterable[float]) -> set[int]:

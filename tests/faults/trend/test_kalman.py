@@ -13,7 +13,6 @@ from faults.trend.kalman import (
     beliefs,
     exponential_growth,
     first_belief,
-    growth_evidence,
     moments,
     predict,
     settings,
@@ -121,15 +120,6 @@ def test_a_log_with_a_larger_deviation_counts_less() -> None:
     assert moves[0] > 2.0 * moves[1] > 0.0
 
 
-def test_evidence_of_growth_is_positive_for_a_slope_and_negative_at_rest() -> None:
-    grid, times, stds = settings(), np.arange(40.0), np.full(40, 0.03)
-    noise = 0.03 * np.random.default_rng(3).standard_normal(40)
-    *_, growing = beliefs(times, 0.02 * times + noise, stds, grid)
-    *_, resting = beliefs(times, noise, stds, grid)
-    assert growth_evidence(growing, grid) > 10.0
-    assert growth_evidence(resting, grid) < 0.0
-
-
 @pytest.mark.parametrize("shared", [-1e4, 0.0, 1e4])
 def test_evidence_common_to_all_settings_does_not_change_their_weights(shared: float) -> None:
     grid = settings()
@@ -150,3 +140,11 @@ def test_weights_sum_to_one_and_half_of_the_prior_is_without_growth() -> None:
 def test_a_series_without_logs_has_only_the_prior_belief() -> None:
     none = np.empty(0)
     assert len(beliefs(none, none, none, settings())) == 1
+
+
+def test_a_pause_of_any_length_leaves_finite_beliefs() -> None:
+    times = np.concatenate([np.arange(6) * 1e-3, 500.0 + np.arange(6) * 1e-3, [2e6]])
+    *_, last = beliefs(times, np.linspace(0.0, 1.2, 13), np.full(13, 0.02), settings())
+    assert all(np.all(np.isfinite(each)) for each in (last.mean, last.covariance, last.evidence))
+    move, _ = exponential_growth(1e6, 0.1)
+    assert move[1] == pytest.approx(1000.0)

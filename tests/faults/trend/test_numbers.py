@@ -15,10 +15,10 @@ from faults.trend.kalman import (
     beliefs,
     evidence_of,
     first_belief,
-    growth_evidence,
     moments,
     settings,
 )
+from faults.trend.rest import growth_evidence, rest_evidence
 from faults.trend.trend import Series, Trend, first_logs_after, trends
 from plant.arrays import Array
 from tests.faults.trend.small_beliefs import next_belief, one_setting
@@ -88,6 +88,7 @@ def beliefs_along_a_series() -> dict[str, Any]:
     grid, told = settings(), dict[str, Any]()
     for kind in ("growing", "bending", "one gross"):
         *_, last = beliefs(TIMES, series(kind), STDS, grid)
+        rest = float(rest_evidence(TIMES, series(kind), STDS, grid)[-1])
         told[kind] = {
             "mean": last.mean[SOME],
             "variances": [np.diag(one) for one in last.covariance[SOME]],
@@ -95,7 +96,7 @@ def beliefs_along_a_series() -> dict[str, Any]:
             "evidence": last.evidence[SOME],
             "weights": last.weights(grid)[SOME],
             "all evidence": evidence_of(last, grid),
-            "of growth": growth_evidence(last, grid),
+            "of growth": growth_evidence(last, grid, rest),
             **{f"state {state}": list(moments(last, grid, state)) for state in range(3)},
         }
     jumped = next_belief(first_belief(grid), 2.5, 0.3, 0.02, grid)
@@ -122,7 +123,7 @@ def _told(found: list[Trend]) -> dict[str, Any]:
         "evidence of growth": [one.growing for one in found[3::5]],
         "certain": [one.certain for one in found],
         "forecast is given": [one.crossing is not None for one in found],
-        "median step of time": last.series.step,
+        "mean step of time": last.series.step,
     }
 
 

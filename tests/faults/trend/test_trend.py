@@ -99,6 +99,38 @@ def test_a_jump_starts_a_new_stretch_and_is_not_taken_for_growth() -> None:
     assert not found.certain
 
 
+def test_a_jump_before_the_third_log_is_not_taken_for_certain_growth() -> None:
+    """Before, six logs of which the first was lower were "certain growth" with a date, in 10 of 30 such actuators."""
+    for jumped in (1, 2):
+        truth = np.where(np.arange(8) < jumped, 0.0, 0.6)
+        found = [*trends(series_of(truth, std=0.03, seed=jumped))]
+        assert not any(one.certain or one.alarm for one in found)
+        assert found[3].crossing is not None
+        assert np.isinf(found[3].crossing.quantiles[3])
+
+
+def in_bursts(count: int = 60, apart: float = 50.0) -> Array:
+    """Return times of logs that come six at a time, some minutes apart, with a pause of weeks between [day]."""
+    place = np.arange(count)
+    return apart * (place // 6) + 0.003 * (place % 6)
+
+
+def test_growth_between_bursts_of_logs_raises_an_alarm() -> None:
+    """Before, the unit of time was the minutes within a burst: the forecast overflowed, or no growth was ever seen."""
+    times = in_bursts()
+    for seed in range(3):
+        plain = series_of(0.0022 * times, seed=seed)
+        place = first_alarm(replace(plain, times=times))
+        assert place is not None
+        assert 0.0022 * times[place] < 0.95
+        assert first_alarm(replace(series_of(np.zeros(60), seed=seed), times=times)) is None
+
+
+def test_a_jump_between_two_bursts_of_logs_is_not_certain_growth() -> None:
+    series = replace(series_of(np.where(np.arange(12) < 6, 0.0, 0.6), std=0.03), times=in_bursts(12))
+    assert not any(one.certain for one in trends(series))
+
+
 def test_steady_growth_is_one_stretch() -> None:
     assert [last_trend(series_of(growth(60), seed=seed)).begin for seed in range(5)] == [0] * 5
 
@@ -137,6 +169,13 @@ def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
     assert np.all(np.isinf(crossing(resting, grid, np.random.default_rng(0)).quantiles))
     late = replace(belief, mean=np.array([[0.2, 0.7 / HORIZON, 0.0]]))
     assert crossing(late, grid, np.random.default_rng(0)).within(HORIZON) == 0.0
+
+
+def test_a_share_of_the_futures_rests() -> None:
+    grid = one_setting(slope=1e-9)
+    belief = replace(first_belief(grid), mean=np.array([[0.2, 0.05, 0.0]]), covariance=np.zeros((1, 3, 3)))
+    found = crossing(belief, grid, np.random.default_rng(0), resting=0.3)
+    assert found.within(HORIZON) == pytest.approx(0.7)
 
 
 def test_constant_curvature_crosses_the_limit_with_its_parabola() -> None:
