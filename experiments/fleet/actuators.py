@@ -9,6 +9,9 @@ from experiments.fleet.outlook import Outlook, outlook_of
 from experiments.fleet.rows import RANKS, LogRow
 from faults.trend.trend import FEWEST
 
+CALM_STATES = ("open", "within")
+"""States of a last log with a verdict in which an alarm tells something new."""
+
 
 @dataclass(frozen=True)
 class ActuatorRow:
@@ -36,16 +39,32 @@ class ActuatorRow:
 
     @cached_property
     def outlook(self) -> Outlook | None:
-        """Outlook for the worst severity of the last log; None if there are too few logs."""
-        if self.last.worst is None or len(self.logs) < FEWEST:
+        """Outlook for the worst severity of the last log; None if there are too few logs.
+
+        If that one raises no alarm but others do, it is the outlook for the one that reaches its limit first.
+        """
+        worst = self.last.worst
+        if worst is None or len(self.logs) < FEWEST:
             return None
-        return outlook_of(self.logs, self.last.worst.name, self.maintained)
+        found = outlook_of(self.logs, worst.name, self.maintained)
+        if self.last.state not in CALM_STATES or (found is not None and found.alarm):
+            return found
+        others = (outlook_of(self.logs, name, self.maintained) for name in self.last.amounts if name != worst.name)
+        nearing = [one for one in others if one is not None and one.alarm]
+        return min(nearing, key=lambda one: one.left[1] if one.left else 0.0, default=found)
 
     @cached_property
     def state(self) -> str:
         """The state of the last log, or an alarm if it is within its limits but is not expected to stay there."""
-        growing = self.last.has_verdict and self.outlook is not None and self.outlook.alarm
-        return "alarm" if growing and self.last.state in ("open", "within", "unknown") else self.last.state
+        calm = self.last.state in CALM_STATES
+        return "alarm" if calm and self.outlook is not None and self.outlook.alarm else self.last.state
+
+    @property
+    def deciding(self) -> str:
+        """Name of the severity that decides: the one that raises the alarm, else the worst; empty if there is none."""
+        if self.state == "alarm" and self.outlook is not None:
+            return self.outlook.name
+        return self.last.worst.name if self.last.worst else ""
 
     @property
     def order(self) -> tuple[int, float]:

@@ -221,6 +221,8 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
     words = "" if outlook is None else outlook.words.replace("past the limit ", "past ", 1)
+    if outlook is not None and last.worst is not None and outlook.name != last.worst.name:
+        words = f"{QUANTITY_NAMES.get(outlook.name, outlook.name)}: {words}"
     return [
         row.name,
         row.state,

@@ -39,8 +39,7 @@ def what_to_do(row: ActuatorRow, *, has_page: bool) -> list[str]:
         return [READ_ITS_PAGE if has_page else DIAGNOSE_IT]
     if row.state not in CALLED_FOR and not last.between:
         return []
-    worst = last.worst.name if last.worst else ""
-    soft = [BLEED] if worst == "bulk_modulus" else []
+    soft = [BLEED] if row.deciding == "bulk_modulus" else []
     if last.between:  # a wrong sensor or rig file would look the same
         wrong = {name: "minor" if size < MAJOR else "major" for name, size in last.between.items() if size > 0.0}
         works = [WORKS[name][level] for name, level in wrong.items()]
@@ -48,6 +47,6 @@ def what_to_do(row: ActuatorRow, *, has_page: bool) -> list[str]:
     found = CONDITIONS.get(last.condition)
     levels = {} if found is None else {name: str(getattr(found, name)) for name in WORKS}
     works = [WORKS[name][level] for name, level in levels.items() if level in WORKS[name]]
-    if not works and found is not None and worst in FAULTS:  # it grows, but is not yet minor
-        works = [WORKS[FAULTS[worst]]["minor"]]
+    if not works and found is not None and row.deciding in FAULTS:  # it grows, but is not yet minor
+        works = [WORKS[FAULTS[row.deciding]]["minor"]]
     return [*works, *soft]

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.eha.plain_verdict import WORK_ON_FRICTION
 from experiments.fleet.actuator_page import actuator_page, segment_levels
 from experiments.fleet.actuators import ActuatorRow, actuator_rows
 from experiments.fleet.naming import by_pattern
 from experiments.fleet.outlook import outlook_of, read_maintenance
+from experiments.fleet.page import row_cells
 from experiments.fleet.rows import log_rows
+from experiments.fleet.to_do import what_to_do
 from experiments.page.sentences import whole_dates
 from experiments.page.still import DAYS
 from plant.errors import HydrostateError
@@ -84,6 +87,27 @@ def test_constant_leakage_raises_no_alarm() -> None:
     assert row.state == "within"
     assert row.outlook is not None
     assert row.outlook.words == "no certain growth"
+
+
+def test_a_growing_severity_raises_the_alarm_behind_another_that_is_steadily_worse() -> None:
+    """Before, only the worst severity of the last log was followed: friction nearing its limit was "within limits"."""
+    files = [f"P-1_{place}.csv" for place in range(30)]
+    rows: list[dict[str, Any]] = []
+    for place, file in enumerate(files):
+        row = dict(store_row(file, 2.6))
+        force = 18.0 * place + 10.0 * float(np.sin(7.0 * place))
+        ends = [force - 30.0, force + 30.0]
+        friction = {"value": force, "unit": "N", "ci95": ends, "healthy": 0.0, "limit": 700.0}
+        rows.append({**row, "quantities": json.dumps({**json.loads(row["quantities"]), "added_friction": friction})})
+    (row,) = actuator_rows(log_rows(rows, by_pattern(files, "{actuator}_{date}.csv"), {}))
+    assert row.last.worst is not None
+    assert (row.last.worst.name, row.last.state, row.state) == ("leakage_flow", "within", "alarm")
+    assert row.deciding == "added_friction"
+    cells = row_cells(row)
+    assert cells[3].startswith("leakage ")
+    assert re.fullmatch(r"added friction: limit in \d+ logs \(\d+ to \d+\)", cells[5]), cells[5]
+    assert what_to_do(row, has_page=True) == [WORK_ON_FRICTION["minor"]]
+    assert '<p class="answer">Added friction reaches its limit in about' in actuator_page(row, {})
 
 
 def test_few_logs_give_no_outlook_and_only_logs_after_a_repair_count() -> None:
