@@ -8,13 +8,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments.fleet.dates import without_wrong_clocks, year_first
+from experiments.fleet.folders import apart_by_folder
 from plant.errors import HydrostateError
 
 STAMP = re.compile(
     r"(?P<year>(?:19|20)\d\d)(?P<between>[-_.]?)(?P<month>0[1-9]|1[0-2])(?P=between)(?P<day>0[1-9]|[12]\d|3[01])"
-    r"(?:[T _-]?(?P<hour>[01]\d|2[0-3])(?P<in_time>[-_.:]?)(?P<minute>[0-5]\d)(?:(?P=in_time)(?P<second>[0-5]\d))?)?"
+    r"(?:[T _-]?(?P<hour>[01]\d|2[0-3])(?P<in_time>[-_.:]?)(?P<minute>[0-5]\d)"
+    r"(?:(?P=in_time)(?P<second>[0-5]\d)(?:[.,](?P<fraction>\d{1,9}))?)?"
+    r"(?P<zone>Z|(?P<sign>[+-])(?P<ahead>0\d|1[0-4])[-_.:]?(?P<half>00|30|45))?)?"
 )
-"""A date in the forms that loggers write into file names, with or without a time: 20261122, 2026-11-22_14-30-00."""
+"""A date in the forms that loggers write into file names, with or without a time: 20261122, 2026-11-22_14-30-00,
+20261122T143000.123+0100."""
 
 CALENDAR = rf"{STAMP.pattern}|\d{{4}}-.*"
 """A calendar date, in the forms that `place_of` reads."""
@@ -104,7 +108,8 @@ def place_of(date: str, source: str) -> float:
     try:
         if stamp is not None:
             parts = (int(stamp[name] or 0) for name in ("year", "month", "day", "hour", "minute", "second"))
-            return datetime(*parts, tzinfo=UTC).timestamp() / 86400.0
+            seconds = datetime(*parts, tzinfo=UTC).timestamp() + float(f"0.{stamp['fraction'] or 0}")
+            return (seconds - _ahead_of_utc(stamp)) / 86400.0
         if re.fullmatch(r"\d{8}|\d{4}-.*", date):
             moment = datetime.fromisoformat(f"{date}-01" if re.fullmatch(r"\d{4}-\d\d", date) else date)
             moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
@@ -114,6 +119,13 @@ def place_of(date: str, source: str) -> float:
         raise HydrostateError(
             f"{source}: date must be ISO 8601 such as 2026-11-22, or a number, got {given!r}"
         ) from error
+
+
+def _ahead_of_utc(stamp: re.Match[str]) -> float:
+    """Return how far the time zone of a `STAMP` is ahead of UTC [s]; a time without a zone counts as UTC."""
+    if not stamp["sign"]:
+        return 0.0
+    return float(f"{stamp['sign']}1") * (3600.0 * int(stamp["ahead"]) + 60.0 * int(stamp["half"]))
 
 
 def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]:
@@ -154,6 +166,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]
         for fields in ({**FIELDS, "date": f"(?P<date>{STAMP.pattern})"}, FIELDS)
     )
     found: dict[str, ActuatorAndDate] = {}
+    folders: dict[str, str] = {}
     for file in files:
         path = file.replace("\\", "/")
         match = stamped.match(path) or wanted.match(path)
@@ -161,8 +174,9 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]
             found[file] = UNNAMED
             continue
         date = match.groupdict().get("date") or ""
+        folders[file] = path[: match.end("actuator")].rpartition("/")[0]
         found[file] = _actuator_and_date(match["actuator"].split("/")[-1], date, "its name")
-    return without_wrong_clocks(_require_a_date(found))
+    return apart_by_folder(without_wrong_clocks(_require_a_date(found)), folders)
 
 
 def _pattern_regex(part: str, fields: Mapping[str, str]) -> str:
@@ -198,7 +212,9 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDat
     """
     found = {file: _by_date(f"{folder}/{file}".replace("\\", "/")) for file in files}
     named = [one.actuator for one in found.values() if one.actuator]
-    return without_wrong_clocks(found) if len(set(named)) < len(named) else {}
+    if len(set(named)) == len(named):
+        return {}
+    return apart_by_folder(without_wrong_clocks(found), {file: _folder_above(file, one) for file, one in found.items()})
 
 
 def actuator_in_name(name: str, pattern: str | None) -> str:
@@ -229,6 +245,13 @@ def actuator_in_name(name: str, pattern: str | None) -> str:
         return by_pattern([name], pattern)[name].actuator
     except HydrostateError:  # the date in the name is invalid
         return ""
+
+
+def _folder_above(file: str, named: ActuatorAndDate) -> str:
+    """Return the folder of a log, or the one above if the folder names the actuator."""
+    folder = file.replace("\\", "/").rpartition("/")[0]
+    above, _, name = f"/{folder}".rpartition("/")
+    return above.lstrip("/") if name == named.actuator else folder
 
 
 def _stem(name: str) -> str:

@@ -138,6 +138,12 @@ def _warn(rows: "Sequence[ActuatorRow]", repairs: Mapping[str, Sequence[float]],
         note(
             f"warning: {len(undated)} of {len(every)} logs have no usable date, so each has its own row, such as {said}"
         )
+    twins = [row.name for row in rows if row.last.named.actuator.count("/")]
+    if twins:
+        note(
+            f"warning: {len(twins)} actuators have the same name as another, and logs of the same time in another "
+            f"folder, so each has its own row, such as {twins[0]}. If they are one, give --names"
+        )
     known = {row.name: row for row in rows}
     for name in repairs:
         if name not in known:

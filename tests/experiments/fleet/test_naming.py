@@ -25,6 +25,41 @@ def test_a_pattern_reads_file_names(pattern: str, file: str, actuator: str, date
     assert (found.actuator, found.date) == (actuator, date)
 
 
+@pytest.mark.parametrize("pattern", [None, "{actuator}_{date}.csv", "{actuator}/*{date}.csv"])
+def test_actuators_of_one_name_in_two_folders_are_two_if_their_logs_are_of_the_same_time(pattern: str | None) -> None:
+    """Before, they were one: a sick one was hidden behind the last log of a sound one."""
+    middle = "P-12/log" if pattern is not None and "/" in pattern else "P-12"
+    sites = [f"site {site}/{middle}_2026-11-{day}.csv" for day in (21, 22) for site in "AB"]
+    months = [f"2026-{month}/{middle}_2026-{month}-{day}.csv" for month in (10, 11) for day in (21, 22)]
+    apart, together = (by_dates(files) if pattern is None else by_pattern(files, pattern) for files in (sites, months))
+    assert [apart[file].actuator for file in sites] == ["site A/P-12", "site B/P-12"] * 2
+    assert {one.actuator for one in together.values()} == {"P-12"}
+
+
+def test_logs_of_one_folder_keep_the_name_of_their_actuator() -> None:
+    found = by_pattern(["P-1_1.csv", "P-1_2.csv", "A/P-1_1.csv", "A/P-2_1.csv"], "{actuator}_{date}.csv")
+    assert [one.actuator for one in found.values()] == ["P-1", "P-1", "A/P-1", "P-2"]
+
+
+@pytest.mark.parametrize(
+    ("stamp", "hours"),
+    [
+        ("2026-03-29T06-30-00+0200", 4.5),
+        ("20260329T063000Z", 6.5),
+        ("20260329_063000.500-0330", 10.0 + 0.5 / 3600.0),
+        ("2026-03-29T06:30+05:45", 0.75),
+        ("2026-03-29_06-30-00.1234", 6.5 + 0.1234 / 3600.0),
+    ],
+)
+def test_a_zone_and_a_fraction_of_a_second_belong_to_the_date_not_to_the_actuator(stamp: str, hours: float) -> None:
+    """Before, an actuator fell in two when summer time began, and each log with milliseconds was an actuator."""
+    files = [f"P-12_{stamp}.csv", "P-12_20260101.csv"]
+    for found in (by_dates(files), by_pattern(files, "{actuator}_{date}.csv")):
+        assert [found[file].actuator for file in files] == ["P-12", "P-12"]
+        assert found[files[0]].place == pytest.approx(place_of("2026-03-29", "log") + hours / 24.0, abs=1e-7)
+        assert found[files[0]].shown == "2026-03-29 06:30"
+
+
 def test_a_file_that_does_not_match_has_no_name() -> None:
     assert by_pattern(["notes.txt"], "{actuator}_{date}.csv") == {"notes.txt": UNNAMED}
 

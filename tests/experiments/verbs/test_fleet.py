@@ -95,6 +95,18 @@ class Stored:
         return pa.Table.from_pylist([{name: row.get(name) for name in columns} for row in self._rows])
 
 
+def test_actuators_of_one_name_in_two_folders_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [f"site {site}/P_2026-01-0{day}.csv" for site in "AB" for day in (1, 2)]
+    stored = Stored([{**ROW, "file": file} for file in files])
+    monkeypatch.setattr("experiments.batch.part_store.open_store", lambda _: stored)
+    code, _, said = invoke("fleet", tmp_path, "--out", tmp_path / "fleet")
+    assert code == 0
+    assert "warning: 2 actuators have the same name as another" in said
+    page = (tmp_path / "fleet" / "index.html").read_text("utf-8")
+    assert "site A/P" in page
+    assert "site B/P" in page
+
+
 @pytest.mark.parametrize(("outcomes", "code"), [(["ok", "ok"], 0), (["ok", "failed"], 1), (["failed", "failed"], 2)])
 def test_the_exit_code_of_a_fleet_says_whether_all_some_or_none_could_be_read(
     outcomes: list[str], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
