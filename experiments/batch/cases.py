@@ -23,7 +23,7 @@ from plant.eha.rig import Rig
 Hash: TypeAlias = Any
 """A hash object in progress; the standard library does not name its type."""
 
-RESULTS_VERSION = 2
+RESULTS_VERSION = 3
 """Increase this when results change for a reason that the content of a case does not show; older rows are then
 remade."""
 
@@ -261,7 +261,7 @@ def _content(series: Series) -> list[Any]:
 
 
 def _numbers(rig: Rig[Any]) -> list[Any]:
-    return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns)]
+    return [asdict(rig.parameters), dict(rig.uncertainties), dict(rig.columns), sorted(rig.measured)]
 
 
 def _motion(series: Series) -> Series | None:

@@ -46,6 +46,13 @@
     const more = element("p", { class: "place more-rows" });
     const view = element("div", { class: "window", tabindex: "0", role: "region", "aria-label": holder.dataset.caption }, table);
 
+    const plain = (text) => text.normalize("NFC").toLowerCase(); // a file's name may hold an accent as a letter of its own
+
+    function shownText(value, place) {
+      if (columns[place].kind === "state") return columns[place].words[value];
+      return typeof value === "string" ? value : "";
+    }
+
     function key(row, column) {
       const value = rows[row][column];
       return columns[column].kind === "state" ? ranks.indexOf(value) : value;
@@ -61,9 +68,9 @@
     }
 
     function arrange() {
-      const asked = words.value.trim().toLowerCase().split(/\s+/).filter(Boolean);
+      const asked = plain(words.value).trim().split(/\s+/).filter(Boolean);
       const fits = (row) => (!state.value || rows[row][states] === state.value)
-        && asked.every((word) => rows[row].some((value) => typeof value === "string" && value.toLowerCase().includes(word)));
+        && asked.every((word) => rows[row].some((value, place) => plain(shownText(value, place)).includes(word)));
       order = rows.map((_, i) => i).filter(fits);
       if (sorted.column >= 0) order.sort(compare);
       count.textContent = `${order.length} of ${rows.length} rows`;

@@ -31,6 +31,16 @@ def test_keys_depend_on_the_rig() -> None:
     assert not set(plan.keys) & set(replace(plan, rig=replace(plan.rig, parameters=parameters)).keys)
 
 
+def test_keys_depend_on_what_was_measured_on_the_bench() -> None:
+    """Before, results stayed those of a volume known to 15 % after the rig file said that it was measured."""
+    plan = small_plan()
+    measured = replace(plan, rig=replace(plan.rig, measured=("chamber_volume",)))
+    assert not set(plan.keys) & set(measured.keys)
+    names = ("piston_area", "chamber_volume")
+    one, other = (replace(plan, rig=replace(plan.rig, measured=order)) for order in (names, names[::-1]))
+    assert one.keys == other.keys
+
+
 @pytest.mark.parametrize("workers", [1, 2, 40])
 def test_tasks_contain_every_unfinished_case_exactly_once(workers: int) -> None:
     plan = small_plan()
