@@ -1,6 +1,7 @@
 """Outlook for the severities of an actuator over its logs: level, growth, and the time to a limit."""
 
 import math
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,15 +31,15 @@ class Outlook:
     logs: tuple[LogRow, ...]
     series: Series
 
-    @cached_property
+    @property
     def course(self) -> list[Trend]:
-        """Estimated trend after each log."""
+        """Estimated trend after each log; not kept, since each takes 25 kB."""
         return list(trends(self.series))
 
-    @property
+    @cached_property
     def trend(self) -> Trend:
         """Estimated trend after the last log."""
-        return self.course[-1]
+        return deque(trends(self.series), maxlen=1)[0].alone
 
     @cached_property
     def quantiles(self) -> tuple[float, ...] | None:

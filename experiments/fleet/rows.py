@@ -70,6 +70,10 @@ class Amount:
         return "open" if high > limit else "within"
 
 
+AMOUNT_NUMBERS = len(fields(Amount)) - 2
+"""Numbers of an `Amount`, which has a name and a unit besides [count]."""
+
+
 @dataclass(frozen=True)
 class LogRow:
     """One log of a fleet.
@@ -167,7 +171,7 @@ def _amounts(text: str | None, limits: Mapping[str, float]) -> dict[str, Amount]
         limit = limits.get(name, one.get("limit"))
         told = [one["value"], *(one["ci95"] or ()), one.get("healthy"), limit]
         numbers = [float(number) for number in told if number is not None and math.isfinite(number)]
-        if len(numbers) == len(fields(Amount)) - 2 and limit != one["healthy"]:
+        if len(numbers) == AMOUNT_NUMBERS and limit != one["healthy"]:
             found[name] = Amount(name, one["unit"], *numbers)
     return found
 

@@ -1,7 +1,7 @@
 """`trends(series)`: after each log, whether a severity grows over an actuator's logs, and when it reaches its limit."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -109,6 +109,12 @@ class Trend:
     def growing(self) -> float:
         """Log odds of the logs with growth against rest, with a jump or without [dimensionless]."""
         return growth_evidence(self.belief, settings(), self.rest)
+
+    @property
+    def alone(self) -> "Trend":
+        """The same trend without the memory that it shares with those after other logs."""
+        now = self.belief
+        return replace(self, belief=Belief(now.mean.copy(), now.covariance.copy(), now.evidence.copy()))
 
     @property
     def _short(self) -> bool:

@@ -158,6 +158,14 @@ def test_the_trend_after_a_log_does_not_depend_on_later_logs() -> None:
     assert numbers(last_trend(early)) == numbers([*trends(series)][19])
 
 
+def test_the_trend_after_one_log_can_be_kept_without_those_after_the_others() -> None:
+    *_, found = trends(series_of(growth(30)))
+    alone = found.alone
+    assert found.belief.mean.base is not None
+    assert all(each.base is None for each in (alone.belief.mean, alone.belief.covariance, alone.belief.evidence))
+    assert (alone.level, alone.growing, alone.alarm) == (found.level, found.growing, found.alarm)
+
+
 def test_a_known_slope_without_noise_crosses_at_a_known_time() -> None:
     grid = one_setting(slope=1e-9)
     start = first_belief(grid)
