@@ -10,7 +10,7 @@ from estimation.fits.greybox.deviations import Information
 from estimation.fits.greybox.play import ShownPlay, crossed_drives, shown_play
 from estimation.fits.greybox.problem import Problem
 from estimation.fits.hypotheses import LATEST
-from estimation.log_checks.channel_names import POSITION, PRESSURE
+from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED
 from plant.arrays import Array
 
 LEAST_LATE = 2e-4
@@ -150,19 +150,23 @@ def late_and_play(
     left = unabsorbed_part(known_of.fitted_slopes, known_of.fitted_bread, told)
     names = [problem.model.unknowns[place] for place in known_of.felt]
 
-    # what a lead below zero would take up of a late pressure is left to bulk modulus
-    held = np.array([name != LEAD for name in names]) & told
-    bread, slopes = known_of.fitted_bread, known_of.fitted_slopes[:, held]
-    softened = np.zeros(len(names))
-    if "bulk_modulus" in names and held[place := names.index("bulk_modulus")]:
-        kept = np.linalg.inv(np.linalg.inv(bread)[np.ix_(held, held)])
-        softened[held] = kept[np.count_nonzero(held[:place])]
+    def softened(held: NDArray[np.bool_]) -> Callable[[Array], float]:
+        """Return how bulk modulus answers a change of residuals if the unknowns that are not ``held`` stay."""
+        slopes = known_of.fitted_slopes[:, held]
+        if "bulk_modulus" not in names or not held[place := names.index("bulk_modulus")]:
+            return lambda _: 0.0
+        kept = np.linalg.inv(np.linalg.inv(known_of.fitted_bread)[np.ix_(held, held)])[np.count_nonzero(held[:place])]
+        return lambda one: float(kept @ (slopes.T @ one.ravel()))
+
+    # what a lead below zero would take up of a late pressure is left to bulk modulus; a late speed is that lead
+    beside_lead = softened(np.array([name != LEAD for name in names]) & told)
+    answers = {channel: softened(told) if channel == SPEED else beside_lead for channel in timed}
 
     def taken(one: Array) -> Iterable[tuple[str, float]]:
         return zip(names, known_of.response(one), strict=False)
 
     return (
-        _delays(timed, moved, left_over, left, lambda one: float(softened[held] @ (slopes.T @ one.ravel()))),
+        _delays(timed, moved, left_over, left, answers),
         shown_play(moved[len(timed) :], left_over, left, taken),
     )
 
@@ -172,12 +176,12 @@ def _delays(
     changes: Sequence[Array],
     errors: Array,
     left: Callable[[Array], Array],
-    softened: Callable[[Array], float],
+    answers: Mapping[str, Callable[[Array], float]],
 ) -> Delays:
-    """Return the delays, with what bulk modulus takes up (``softened``) of each; the rest as in `lateness`."""
+    """Return the delays, with what bulk modulus takes up (``answers``) of each; the rest as in `lateness`."""
     by_channel = dict(zip(timed, changes, strict=False))
     return {
-        channel: (behind, gain, behind * softened(by_channel[channel]) / LATE_NUDGE)
+        channel: (behind, gain, behind * answers[channel](by_channel[channel]) / LATE_NUDGE)
         for channel, (behind, gain) in lateness(timed, changes, errors, left)
     }
 

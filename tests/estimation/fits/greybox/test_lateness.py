@@ -1,6 +1,8 @@
 """Channels that are slightly late or early, and a speed that leads position and pressure."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +10,15 @@ from scipy.signal import lfilter
 
 from estimation.eha.explanation_notes import corrected_log, notes_of
 from estimation.fits.flow.fit import fit_flow
-from estimation.fits.greybox.lateness import LEAST_LATE, latest_channel, omitted_delay_doubt
+from estimation.fits.greybox.lateness import (
+    BY_CHANCE,
+    LATE_NUDGE,
+    LEAD,
+    LEAST_LATE,
+    late_and_play,
+    latest_channel,
+    omitted_delay_doubt,
+)
 from estimation.fits.hypotheses import LATEST
 from estimation.log_checks.clean import clean_log
 from estimation.notes import RigCode
@@ -98,3 +108,25 @@ def test_a_lag_that_looks_like_soft_oil_is_within_the_interval(frequency: float,
 def test_a_delay_that_may_be_chance_is_no_doubt() -> None:
     assert omitted_delay_doubt({}) == 0.0
     assert omitted_delay_doubt({SPEED: (3e-4, 2.8, 0.2), PRESSURE: (2e-4, 3.0, -0.1)}) == 0.1
+
+
+def test_the_lead_takes_up_a_late_speed_but_not_a_late_pressure() -> None:
+    """A spring load and a ramp told 90 and 190 % of bulk modulus by delays of speed that gained 4 and 7: no number."""
+    softness, rest, other = np.linalg.qr(np.random.default_rng(2).standard_normal((400, 3)))[0].T
+    slopes = np.column_stack([softness, 0.9 * softness + 0.2 * rest])  # a ramp hardly tells a lead from soft oil
+    change = 1e3 * LATE_NUDGE * (slopes[:, 1] + 1e-3 * other)
+    problem: Any = SimpleNamespace(
+        log=SimpleNamespace(timed=(SPEED, "position_m", PRESSURE)),
+        model=SimpleNamespace(unknowns=("bulk_modulus", LEAD)),
+    )
+    known_of: Any = SimpleNamespace(
+        felt=np.arange(2),
+        left_over=3.0 * other,
+        fitted_slopes=slopes,
+        fitted_bread=np.linalg.inv(slopes.T @ slopes),
+        response=lambda _: np.zeros(2),
+    )
+    late, _ = late_and_play(problem, known_of, 3 * [change[None]], np.array([True, True]))
+    assert late[SPEED][:2] == late[PRESSURE][:2] == pytest.approx((-3.0, 4.5))
+    assert late[SPEED][1] > BY_CHANCE
+    assert abs(late[SPEED][2]) < 1e-6 * abs(late[PRESSURE][2])
