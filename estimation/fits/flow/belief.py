@@ -1,5 +1,6 @@
 """Costs of hypotheses: above which they are hopeless, and below which they are believed."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -11,11 +12,13 @@ from estimation.fits.flow.agreement import wanted_gain
 from estimation.fits.flow.log import homed_at_stop
 from estimation.fits.flow.log_traits import LogTraits
 from estimation.fits.flow.plain import PlainFits
+from estimation.fits.flow.told_volume import unlikely_volume
 from estimation.fits.greybox.fit import GreyBoxFit
 from estimation.fits.hypotheses import ENCODER_ZERO, HYPOTHESES, OFFSET, PLAY, PRESSURE_LATE, Hypothesis
 from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import fit_explains_all
+from estimation.fits.hypothesis_search.fit_objections import exceeds_noise, fit_explains_all
+from estimation.fits.hypothesis_search.form_fit import TEMPER
 from estimation.notes import RigCode
 from plant.notes import Note
 
@@ -118,6 +121,54 @@ def wanted_cost_in(names: Sequence[str], plain: PlainFits, traits: LogTraits, le
     best, swinging, worth = plain.best, plain.swinging, wanted_gain(plain, left)
     homed, astray = homed_at_stop(plain.log), is_far_stiffer(plain.log, swinging.values)
     return wanted_cost(names, best, swinging, homed=homed, late=traits.filtered, astray=astray, worth=worth)
+
+
+def judged(
+    plain: PlainFits, strange: Explanation, traits: LogTraits, explains: Callable[[GreyBoxFit], bool]
+) -> tuple[Explanation | None, tuple[Note, ...]]:
+    """Return the likeliest hypotheses of a log if they are believed, else hints at what nearly explains it.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's plain fits.
+    strange : Explanation
+        The likeliest hypotheses.
+    traits : LogTraits
+        How the log was logged.
+    explains : callable
+        ``explains(fit)``: whether a fit explains the log.
+    """
+    gained = wanted_cost_in(strange.names, plain, traits, strange.fit.chi_square[0]) - strange.fit.cost
+    crossed = PLAY.name not in strange.names or not exceeds_noise(strange.fit)  # beside a play only noise may be left
+    if gained <= 0.0 or not crossed or not explains(strange.fit):
+        return None, nearly_explained(plain, strange)
+    if gained <= volume_worth(plain, strange):
+        return None, unlikely_volume(strange, plain.swinging, plain.start.parameters.chamber_volume)
+    return strange, ()
+
+
+def volume_worth(plain: PlainFits, strange: Explanation) -> float:
+    """Return the further gain that another chamber volume must reach where the rig file's volume explains the log too.
+
+    The plain form is then a rival with the file's volume, weighed as rivals are: by likelihood, with its usual divisor
+    since no model is exact, and by what the rig file says of the volume.
+
+    Parameters
+    ----------
+    plain : PlainFits
+        The log's plain fits.
+    strange : Explanation
+        The likeliest hypotheses.
+
+    Returns
+    -------
+    float
+        Gain in log-likelihood; 0 if no volume is told, or only another one explains the log [dimensionless].
+    """
+    if strange.priors is None or not plain.explains(plain.best):
+        return 0.0
+    return -TEMPER * math.log(strange.priors[0])
 
 
 def nearly_explained(plain: PlainFits, strange: Explanation) -> tuple[Note, ...]:

@@ -16,7 +16,7 @@ from estimation.fits.flow.asked_hypotheses import (
     is_astray,
     near_starts,
 )
-from estimation.fits.flow.belief import explanation_test, hopeless_cost, likelier_of, nearly_explained, wanted_cost_in
+from estimation.fits.flow.belief import explanation_test, hopeless_cost, judged, likelier_of, wanted_cost_in
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, with_lumped, with_lumped_slopes
@@ -28,7 +28,7 @@ from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter_start, with_stiff_oil
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.shut_valves import shut_valves
-from estimation.fits.flow.told_volume import explained_bound, ratio_doubt
+from estimation.fits.flow.told_volume import explained_bound, ratio_doubt, unlikely_volume_doubt
 from estimation.fits.greybox.lateness import omitted_delay_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, omitted_play_note, play_structure, sensed_play
 from estimation.fits.greybox.small_pump_ripple import with_shifts
@@ -46,7 +46,7 @@ from estimation.fits.hypotheses import (
 )
 from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN, explain
 from estimation.fits.hypothesis_search.explanation import Explanation
-from estimation.fits.hypothesis_search.fit_objections import exceeds_noise, objections_and_play, residual_limits
+from estimation.fits.hypothesis_search.fit_objections import objections_and_play, residual_limits
 from estimation.fits.hypothesis_search.form_fit import DISCRETISED, FormFit, model_mean, weights_of, with_structure
 from estimation.fits.hypothesis_search.not_excluded import open_wear_note, share_lost, unseen_valve_note
 from estimation.fits.hypothesis_search.pump_delivery import delivery_objection
@@ -236,13 +236,7 @@ def _ask(plain: PlainFits, asked: Sequence[Hypothesis], traits: LogTraits) -> tu
         homed=homed_at_stop(plain.log),
         useful=wanted_cost_in((asked[0].name,), plain, traits, 0.0) if alone else np.inf,
     )
-    if strange is None:
-        return None, ()
-    lower = strange.fit.cost < wanted_cost_in(strange.names, plain, traits, strange.fit.chi_square[0])
-    crossed = PLAY.name not in strange.names or not exceeds_noise(strange.fit)  # beside a play only noise may be left
-    if lower and crossed and explains(strange.fit):
-        return strange, ()
-    return None, nearly_explained(plain, strange)
+    return (None, ()) if strange is None else judged(plain, strange, traits, explains)
 
 
 def _varying_loss(plain: PlainFits, traits: LogTraits) -> VaryingLoss | None:
@@ -334,8 +328,9 @@ def _plain_fit(plain: PlainFits, sensed: ShownPlay, open_ends: Sequence[Note], *
     if begun and not reasons and not explanation_test(plain, begun=begun)(best):
         reasons = (EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=best.chi_square[0] ** 0.5),)
     (value, std), gas = found["bulk_modulus"], () if reasons else gas_contradicted(plain.log, plain.swinging, p)
+    doubts = [left, untaken, omitted_delay_doubt(best.late), unlikely_volume_doubt(open_ends)]
     return FormFit(
-        parameters=with_structure(found, float(np.linalg.norm([left, untaken, omitted_delay_doubt(best.late)]))),
+        parameters=with_structure(found, float(np.linalg.norm(doubts))),
         bound=std / value,
         chi_square=best.chi_square[0],
         reasons=reasons,

@@ -5,8 +5,11 @@ from typing import Any
 
 import pytest
 
-from estimation.fits.flow.belief import likelier_of, nearly_explained
+from estimation.fits.flow import belief
+from estimation.fits.flow.belief import judged, likelier_of, nearly_explained
+from estimation.fits.flow.log_traits import AT_REST
 from estimation.fits.hypothesis_search.explanation import Explanation
+from estimation.notes import RigCode
 from tests.estimation.fits.short_logs import made_fit
 
 
@@ -37,3 +40,29 @@ def test_a_hypothesis_that_removes_nearly_all_of_the_misfit_is_hinted_at(chi: fl
 def test_a_log_that_the_plain_form_explains_gets_no_hint() -> None:
     plain: Any = SimpleNamespace(best=made_fit(5e4, 2e8, 1e5, chi=1.02), explains=lambda fit: fit.chi_square[0] < 1.05)
     assert nearly_explained(plain, explanation("makeup_blocked", 1e3)) == ()
+
+
+@pytest.mark.parametrize(
+    ("gained", "prior", "chi", "believed"),
+    [
+        (17.6, 1e-3, 1.0, False),  # 57 % of the rig file's volume, at 15 %: the plain form is likelier
+        (50.0, 1e-3, 1.0, True),
+        (17.6, 0.5, 1.0, True),
+        (17.6, 1e-3, 1.1, True),  # only the other volume explains the log
+        (17.6, 1.0, 1.0, True),
+    ],
+)
+def test_another_volume_is_weighed_against_that_of_the_rig_file(
+    gained: float, prior: float, chi: float, monkeypatch: pytest.MonkeyPatch, *, believed: bool
+) -> None:
+    """A ramp of 11 mm under 2 um of noise told 57 +- 8 % of the chambers, with bulk modulus 43 % low."""
+    best = made_fit(1e3, 4.9e8, 1e7, chi=chi)
+    start = SimpleNamespace(parameters=SimpleNamespace(chamber_volume=2.7e-4))
+    plain: Any = SimpleNamespace(best=best, swinging=best, start=start, explains=lambda fit: fit.chi_square[0] < 1.05)
+    monkeypatch.setattr(belief, "wanted_cost_in", lambda *_: best.cost - 10.0)
+    values = {"chamber_volume": (1.54e-4, 1.2e-5), "bulk_modulus": (2.76e8, 2.6e7)}
+    fit = made_fit(best.cost - gained, 2.76e8, 2.6e7)
+    other = Explanation(("volume",), values, {}, (fit,), (), 1e6, priors=(prior,))
+    found, notes = judged(plain, other, AT_REST, plain.explains)
+    assert (found is other) is believed
+    assert [note.code for note in notes] == ([] if believed else [RigCode.VOLUME_UNLIKELY])
