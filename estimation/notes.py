@@ -272,8 +272,8 @@ class RigCode(Code):
     AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
     VOLUME_UNLIKELY = (
         "this log fits a chamber volume of {percent:.0f} ± {half_width:.2g} % of that in the rig file a little better "
-        "(bulk modulus {modulus_percent:+.0f} %), but the rig file makes that volume unlikely: its own is used, and the "
-        "interval reaches both; measure chamber_volume, or log a longer travel"
+        "(bulk modulus {modulus_percent:+.0f} %), but the rig file makes that volume unlikely: its own is used, and "
+        "the interval reaches both; measure chamber_volume, or log a longer travel"
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.1f} ± {half_width:.2g} % of that in the rig file"
     STARTS_UNDER_LOAD = (
