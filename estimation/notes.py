@@ -187,9 +187,7 @@ class EstimateCode(Code):
         "{state} still changed by {moved:.3g} {unit} over the last fifth of the log: the estimate has not settled"
     )
     AT_PHYSICAL_BOUND = "{state} ended at its physical limit ({value:.3g} {unit})"
-    PUMP_AND_PISTON_REST = (
-        "neither the pump nor the piston moves noticeably in this log: bulk modulus is not observable"
-    )
+    PUMP_AND_PISTON_REST = "neither pump nor piston moves noticeably in this log: bulk modulus is not observable"
     POSITION_CONSTANT = "{channel} never changes: the sensor is dead, or the piston stands still; find out which"
     PISTON_STANDS_STILL = (
         "the piston moves by only {moved_m:.2g|mm} mm, while the pump turns enough for {pumped_m:.3g|mm} mm: it is "
@@ -233,9 +231,7 @@ class RigCode(Code):
         "position_m reads {zero_mm:.1f} ± {half_width_mm:.2g} mm at mid-stroke; it was shifted to zero there. If its "
         "zero is right, chamber {side} holds {more:.2g|L} L more than the other (a hose)"
     )
-    POSITION_PLAY = (
-        "position_m follows the piston with about {play_um:.1g} um of play (backlash); the play was corrected"
-    )
+    POSITION_PLAY = "position_m follows the piston with about {play_um:.1g} um of play (backlash); it was corrected"
     PLAY_NOT_EXCLUDED = (
         "the piston moves a little while position_m stands still, by chance or because of about {play_um:.1g} um of "
         "play (backlash): the interval of bulk modulus includes its effect"
@@ -271,9 +267,8 @@ class RigCode(Code):
     )
     AREAS_VAGUE = "the ratio of the piston's areas is known to ± {percent:.0f} % only: give two areas in the rig file"
     VOLUME_UNLIKELY = (
-        "this log fits a chamber volume of {percent:.0f} ± {half_width:.2g} % of that in the rig file a little better "
-        "(bulk modulus {modulus_percent:+.0f} %), but the rig file makes that volume unlikely: its own is used, and "
-        "the interval reaches both; measure chamber_volume, or log a longer travel"
+        "{percent:.0f} ± {half_width:.2g} % of the rig file's chamber_volume fits a little better, with a bulk modulus "
+        "{modulus_percent:+.0f} % away; the file makes that unlikely, the interval reaches it: measure chamber_volume"
     )
     VOLUME_DIFFERS = "the chamber volume is {percent:.1f} ± {half_width:.2g} % of that in the rig file"
     STARTS_UNDER_LOAD = (
