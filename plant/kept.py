@@ -22,7 +22,7 @@ def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
     path : Path
         The file to write.
     kind : str
-        Name of the writer, with the number of its format: ``hydrostate watch 2``.
+        Name of the writer, with the number of its format: ``hydrostate watch 3``.
     values : Mapping[str, ndarray], each of its own shape
         Numbers or texts by name [any unit].
 

@@ -31,7 +31,7 @@ def excitation_octave(change: float) -> int:
     return min(max(int(math.log(change / STILL + 1.0) / math.log(2.0)), 0), OCTAVES - 1)
 
 
-def standardise(value: float, memory: float, judged: bool, usual: Array) -> float:
+def standardise(value: float, memory: float, judged: bool, least: float, usual: Array) -> float:
     """Return how far a log NIS exceeds the usual value of its class, and update the usual value.
 
     Parameters
@@ -42,6 +42,8 @@ def standardise(value: float, memory: float, judged: bool, usual: Array) -> floa
         Number of blocks of a class that are remembered [count].
     judged : bool
         Whether the block counts; 0 is returned otherwise, and while too few blocks of the class are known.
+    least : float
+        Least standard deviation of the class [dimensionless].
     usual : ndarray, shape (3,)
         Mean, variance and count of the class.
 
@@ -52,7 +54,7 @@ def standardise(value: float, memory: float, judged: bool, usual: Array) -> floa
     """
     away, score = value - usual[MEAN], 0.0
     if judged and usual[COUNT] >= LEAST_BLOCKS:
-        score = min(away / math.sqrt(usual[VARIANCE] + 1e-12), LARGEST_SCORE)
+        score = min(away / max(math.sqrt(usual[VARIANCE] + 1e-12), least), LARGEST_SCORE)
     usual[COUNT] = min(usual[COUNT] + 1.0, memory)
     share = 1.0 / usual[COUNT]
     usual[MEAN] += share * away

@@ -10,10 +10,10 @@ from functools import cache
 
 import numpy as np
 
-from faults.watch import balances, cusum, excitation, loss, memory
+from faults.watch import balances, cusum, excitation, loss, memory, resolution
 from faults.watch.balances import FEATURES, W1, count_gains, learn, regress, shift, solve
-from faults.watch.cusum import PEAK, SQUARES, SUM, THRESHOLD, accumulate, threshold
-from faults.watch.excitation import OCTAVES, excitation_octave, standardise
+from faults.watch.cusum import PEAK, SQUARES, SUM, THRESHOLD, accumulate, threshold, white_threshold
+from faults.watch.excitation import MEAN, OCTAVES, excitation_octave, standardise
 from faults.watch.loss import (
     BLOCKS,
     DELAYS,
@@ -50,6 +50,7 @@ from faults.watch.memory import (
     WatchSetting,
     WatchSizes,
 )
+from faults.watch.resolution import PLACE, PRESSURE, SPEED, find_step, least_deviation, unresolved
 from plant.arrays import Array
 from plant.compiled.native.load import NativeKernel, load_native
 from plant.compiled.native.signature import signature_of
@@ -93,6 +94,9 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
     partial, lags, score = memory.partial, memory.lags, memory.score
     features, target, factor = np.empty((2, FEATURES)), np.empty(score.shape[0]), np.empty((FEATURES, FEATURES))
     for k in range(first, rows.shape[0]):
+        find_step(rows[k, 0], setting.rated_speed, SPEED, memory.steps)
+        find_step(rows[k, 1], setting.rated_step * sizes.samples, PLACE, memory.steps)
+        find_step(rows[k, 2], setting.relief, PRESSURE, memory.steps)
         partial[SAMPLES] += 1.0
         partial[SPEED_SUM] += rows[k, 0]
         partial[PRESSURE_SUM] += rows[k, 2]
@@ -187,11 +191,13 @@ def score_balances(
     clock, score, peaks = memory.clock, memory.score, memory.peaks
     news = NOTHING
     for c in range(score.shape[0]):
-        value = math.log(score[c, SQUARES] / moved + 1e-30)
+        rounding = unresolved(c, score.shape[0], memory.steps)
+        value = math.log(score[c, SQUARES] / moved + rounding + 1e-30)
         score[c, SQUARES] = 0.0
         solve(memory.information[c], memory.moment[c], memory.found[c], factor)
         if since > sizes.settle:
-            u = standardise(value, setting.score_memory, since > 2.0 * sizes.settle, memory.usual[c, excited])
+            usual, judged = memory.usual[c, excited], since > 2.0 * sizes.settle
+            u = standardise(value, setting.score_memory, judged, least_deviation(rounding, usual[MEAN]), usual)
             memory.scores[c, place] = u
             if since > sizes.resume:
                 accumulate(score[c], peaks[c], u, ALLOWANCE, LEVEL)
@@ -207,11 +213,16 @@ def score_balances(
 
 
 def renew_thresholds(setting: WatchSetting, memory: Memory) -> None:
-    """Set each balance's threshold from the peaks so far, so that together they give the allowed false-alarm rate."""
+    """Set each balance's threshold from the peaks so far, so that together they give the allowed false-alarm rate.
+
+    White noise has the lowest, which is also that of a stream without peaks.
+    """
     score, peaks = memory.score, memory.peaks
+    rate = setting.false_alarms / score.shape[0]
     for c in range(score.shape[0]):
-        expected = setting.false_alarms * memory.clock[SCORED] / score.shape[0]
-        score[c, THRESHOLD] = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected)
+        expected = rate * memory.clock[SCORED]
+        learnt, least = threshold(peaks[c, :-1], peaks[c, peaks.shape[1] - 1], LEVEL, expected), white_threshold(rate)
+        score[c, THRESHOLD] = learnt if least < learnt < math.inf else least
 
 
 def end_span(memory: Memory) -> bool:
@@ -251,13 +262,24 @@ def watch_kernel() -> NativeKernel:
     """Return the compiled kernel: `advance`, `begin_again` and `threshold`."""
     constants = {
         name: value
-        for module in (balances, cusum, excitation, loss, memory)
+        for module in (balances, cusum, excitation, loss, memory, resolution)
         for name, value in vars(module).items()
         if name.isupper() and isinstance(value, int | float)
     }
     constants |= {"NOTHING": NOTHING, "READY": READY, "LOSS": LOSS, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
     constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
-    of_balances = (regress, shift, learn, count_gains, solve, accumulate, excitation_octave, standardise)
+    of_balances = (
+        regress,
+        shift,
+        learn,
+        count_gains,
+        solve,
+        accumulate,
+        excitation_octave,
+        standardise,
+        white_threshold,
+    )
+    of_steps = find_step, unresolved, least_deviation
     of_loss = (
         count_work,
         count_lag,
@@ -269,7 +291,7 @@ def watch_kernel() -> NativeKernel:
         judge_loss,
     )
     of_blocks = (drop_span, end_span, renew_thresholds, score_balances, end_block)
-    small = functions_text(*of_balances, *of_loss, *of_blocks, constants=constants, inlined=True)
+    small = functions_text(*of_balances, *of_steps, *of_loss, *of_blocks, constants=constants, inlined=True)
     entries = threshold, advance, begin_again
     large = functions_text(*entries)
     text = kernel_text("the watch over flow and force balances", small, large)

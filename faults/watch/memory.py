@@ -8,6 +8,7 @@ from faults.watch.balances import FEATURES, GAINS
 from faults.watch.cusum import THRESHOLD
 from faults.watch.excitation import OCTAVES
 from faults.watch.loss import DELAYS, LIMIT, SEEN, WANTED, WORK
+from faults.watch.resolution import BEFORE, LEAST_STEP
 from plant.arrays import Array
 
 RECENT = 512
@@ -69,6 +70,8 @@ class Memory(NamedTuple):
         State of the loss, as in `faults.watch.loss`.
     levels : ndarray, shape (spans, 2)
         Levels of the last spans.
+    steps : ndarray, shape (2, 3)
+        Last sample and smallest step of each channel, as in `faults.watch.resolution`.
     """
 
     partial: Array
@@ -88,6 +91,7 @@ class Memory(NamedTuple):
     lost: Array
     known: Array
     levels: Array
+    steps: Array
 
 
 class WatchSetting(NamedTuple):
@@ -134,7 +138,7 @@ def empty_memory(balances: int, loss_threshold: float) -> Memory:
     """
     lagged = DELAYS + 2
     balance = (FEATURES, FEATURES), (FEATURES,), (FEATURES,), (SCORE,), (LEVELS + 1,), (RECENT,)
-    slow = (WORK,), (2, lagged), (lagged, lagged), (lagged,), (SEEN + 1,), (KEPT_SPANS, 2)
+    slow = (WORK,), (2, lagged), (lagged, lagged), (lagged,), (SEEN + 1,), (KEPT_SPANS, 2), (2, 3)
     shapes = (
         *((PARTIAL,), (CLOCK,), (LAGS,)),
         *((balances, *shape) for shape in balance),
@@ -142,6 +146,7 @@ def empty_memory(balances: int, loss_threshold: float) -> Memory:
     )
     memory = Memory._make(np.zeros(shape) for shape in shapes)
     memory.partial[POSITION] = np.nan
-    memory.score[:, THRESHOLD] = np.inf
+    memory.score[:, THRESHOLD] = memory.steps[LEAST_STEP] = np.inf
+    memory.steps[BEFORE] = np.nan
     memory.known[WANTED], memory.known[LIMIT] = np.inf, loss_threshold
     return memory

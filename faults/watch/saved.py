@@ -8,7 +8,7 @@ from faults.watch.watch import Watch
 from plant.arrays import Array
 from plant.kept import read_kept, write_kept
 
-FORMAT = "hydrostate watch 2"
+FORMAT = "hydrostate watch 3"
 
 
 def save_watch(watch: Watch, path: Path, travelled: float = 0.0) -> None:

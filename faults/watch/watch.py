@@ -256,9 +256,8 @@ class Watch:
         own = self.remembered()
         alike = all(name in kept and (name == "open" or kept[name].shape == own[name].shape) for name in own)
         if not alike or not np.array_equal(kept["asked"], own["asked"]):
-            raise HydrostateError(
-                "a watch can only continue one of the same rig, channels, rate, learning and false alarms"
-            )
+            said = "a watch can only continue one of the same rig, channels, rate, learning and false alarms"
+            raise HydrostateError(f"{said}; to learn again, delete its state file")
         for i, one in enumerate(self._memory):
             one[:] = kept[f"memory_{i}"]
         self.start = float(kept["start"][0])

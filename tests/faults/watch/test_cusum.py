@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from faults.watch.cusum import PEAK, SUM, accumulate, threshold
+from faults.watch.cusum import PEAK, SUM, accumulate, threshold, white_threshold
 
 
 def test_the_cusum_is_the_largest_sum_over_all_starting_points() -> None:
@@ -47,6 +47,16 @@ def test_alarms_count_as_peaks_of_at_least_the_threshold() -> None:
     assert level == pytest.approx(SCALE * math.log(count / alarms), abs=0.02)
     blind = threshold(seen, 0.0, WIDTH, float(alarms))
     assert blind < level - 0.05
+
+
+def test_white_noise_exceeds_its_threshold_at_the_requested_rate() -> None:
+    rng, expected = np.random.default_rng(3), 1e-3
+    nis = np.log(rng.chisquare(10, 400_000) / 10.0)
+    score, peaks, level = np.zeros(4), np.zeros(401), white_threshold(expected)
+    for u in (nis - nis.mean()) / nis.std():
+        accumulate(score, peaks, float(u), 1.0, 0.02)
+    assert peaks[round(level / 0.02) :].sum() == pytest.approx(400, rel=0.2)
+    assert white_threshold(0.5) == 1.0
 
 
 def test_a_stream_without_peaks_has_no_threshold() -> None:

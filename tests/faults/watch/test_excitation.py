@@ -24,7 +24,7 @@ def test_steady_motion_is_in_the_first_octave_and_reversals_are_in_higher_ones()
 
 def test_scores_of_a_class_have_mean_zero_and_deviation_one() -> None:
     rng, usual = np.random.default_rng(0), np.zeros(3)
-    scores = [standardise(-6.0 + 0.3 * rng.standard_normal(), 300.0, True, usual) for _ in range(5000)]
+    scores = [standardise(-6.0 + 0.3 * rng.standard_normal(), 300.0, True, 0.0, usual) for _ in range(5000)]
     assert np.mean(scores[500:]) == pytest.approx(0.0, abs=0.05)
     assert np.std(scores[500:]) == pytest.approx(1.0, abs=0.05)
     assert usual[MEAN] == pytest.approx(-6.0, abs=0.1)
@@ -34,11 +34,11 @@ def test_scores_of_a_class_have_mean_zero_and_deviation_one() -> None:
 def test_a_class_is_learnt_before_it_is_scored_and_the_score_of_a_block_is_limited() -> None:
     usual = np.zeros(3)
     values = [0.0, 0.1] * int(LEAST_BLOCKS)
-    scores = [standardise(value, 300.0, True, usual) for value in values]
+    scores = [standardise(value, 300.0, True, 0.0, usual) for value in values]
     assert not any(scores[: int(LEAST_BLOCKS)])
     assert any(scores[int(LEAST_BLOCKS) :])
-    assert standardise(50.0, 300.0, True, usual) == LARGEST_SCORE
-    assert standardise(50.0, 300.0, False, usual) == 0.0
+    assert standardise(50.0, 300.0, True, 0.0, usual) == LARGEST_SCORE
+    assert standardise(50.0, 300.0, False, 0.0, usual) == 0.0
     assert usual[COUNT] == len(values) + 2
 
 
@@ -46,7 +46,7 @@ def test_moments_weight_all_values_equally_and_fade_beyond_the_memory() -> None:
     values, memory = 3.0 + 2.0 * np.random.default_rng(2).standard_normal(60), 20.0
     usual = np.zeros(3)
     for n, value in enumerate(values, 1):
-        standardise(value, memory, False, usual)
+        standardise(value, memory, False, 0.0, usual)
         shares = np.minimum(1.0, 1.0 / np.minimum(np.arange(1, n + 1), memory))
         weights = shares * np.append(np.cumprod((1.0 - shares[1:])[::-1])[::-1], 1.0)
         mean = weights @ values[:n]

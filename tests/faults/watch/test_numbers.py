@@ -8,7 +8,7 @@ import pytest
 
 from faults.watch import loss
 from faults.watch.balances import FEATURES, GAINS, count_gains, learn, regress, shift, solve
-from faults.watch.cusum import accumulate, threshold
+from faults.watch.cusum import accumulate, threshold, white_threshold
 from faults.watch.events import Alarm, Event, Ready, change_time
 from faults.watch.excitation import LEAST_BLOCKS, OCTAVES, excitation_octave, standardise
 from faults.watch.growth import growth_time
@@ -26,6 +26,7 @@ from faults.watch.loss import (
     measure_work,
 )
 from faults.watch.memory import empty_memory
+from faults.watch.resolution import PLACE, find_step, least_deviation, unresolved
 from faults.watch.samples import watched_samples
 from faults.watch.watch import Watch, watch_record
 from plant.arrays import Array
@@ -96,6 +97,7 @@ def sums_of_scores_and_their_thresholds() -> dict[str, Any]:
         ],
         "threshold after alarms": [threshold(peaks[:-1], alarms, 0.02, 1.0) for alarms in (1.0, 5.0, 40.0)],
         "threshold without peaks": threshold(np.zeros(40), 0.0, 0.02, 1.0),
+        "threshold of white noise": [white_threshold(rate) for rate in (0.02, 1e-4, 7e-6, 1e-9)],
         "threshold of few peaks": threshold(np.where(np.arange(40) % 9 == 4, 1.0, 0.0), 2.0, 0.02, 0.5),
     }
 
@@ -104,14 +106,31 @@ def sums_of_scores_and_their_thresholds() -> dict[str, Any]:
 def excitation_and_standard_scores() -> dict[str, Any]:
     usual, scores = np.zeros(3), []
     for k, value in enumerate(0.5 + 0.3 * np.sin(1.7 * np.arange(60.0)) + 0.9 * (np.arange(60) == 50)):
-        scores.append(standardise(float(value), 30.0, k > 10, usual))
+        scores.append(standardise(float(value), 30.0, k > 10, 0.0, usual))
     return {
         "octaves": [excitation_octave(change) for change in (0.0, 5e-4, 1.1e-3, 0.02, 0.9, 3.0, 1e4)],
         "count of octaves": OCTAVES,
         "blocks before a score": LEAST_BLOCKS,
         "scores": [scores[place] for place in (5, 19, 20, 21, 35, 50, 59)],
         "mean, variance, count": usual,
-        "largest score": standardise(1e6, 30.0, True, usual),
+        "largest score": standardise(1e6, 30.0, True, 0.0, usual),
+        "score with a least deviation": standardise(1.5, 30.0, True, 0.9, np.array([0.5, 0.04, 30.0])),
+    }
+
+
+@NUMBERS.case()
+def rounding_of_the_channels() -> dict[str, Any]:
+    steps = np.array([[np.nan] * 3, [np.inf] * 3])
+    for k, value in enumerate((0.0, 0.4, 0.4, np.nan, 0.1, 0.103, 0.103004, 0.2)):
+        find_step(value, 10.0, k % 3, steps)
+        find_step(value, 4.0, PLACE, steps)
+    rounding = [unresolved(balance, balances, steps) for balance, balances in ((0, 1), (0, 2), (1, 2))]
+    usual = [-30.0, -15.0, -12.0, -9.0, 0.0]
+    return {
+        "last samples and smallest steps [fraction]": steps,
+        "squared residual of motion, flow, force": rounding,
+        "least deviation by usual log NIS": [least_deviation(1e-5, one) for one in usual],
+        "least deviation without rounding": least_deviation(0.0, -12.0),
     }
 
 
