@@ -138,7 +138,7 @@ def watch_stream(out: Connection, server: int, task: StreamTask) -> None:
     told, outcome, said = Gauges(out), "failed", ""
     with contextlib.suppress(BrokenPipeError):
         try:
-            settings = WatchSettings(load_rig(task.rig), dict(task.columns), task.false_alarms)
+            settings = WatchSettings(load_rig(task.rig), dict(task.columns), task.false_alarms, renew=True)
             watch_network(told, task.address, settings, task.state)
             outcome = "ok"
         except HydrostateError as error:

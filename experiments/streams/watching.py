@@ -11,7 +11,7 @@ from experiments.command.terminal import note
 from experiments.streams.rows import open_rows, report_left_out_rows, warn_of_cut_row, warn_of_lost_batches
 from experiments.streams.state_file import require_same_rate, save_at_intervals
 from experiments.streams.watch_events import WatchEvents
-from plant.errors import LogError
+from plant.errors import HydrostateError, LogError
 from plant.log.stream.source import BatchCounts, stream_lines
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ class WatchSettings:
         Healthy running before alarms are possible [s].
     healthy : Path or None
         A healthy log from which to learn first.
+    renew : bool
+        Whether learning starts again if the state file does not fit, as where nobody can be asked to delete it.
     """
 
     rig: "Rig"
@@ -49,6 +51,7 @@ class WatchSettings:
     learning: float = LEARNING
     healthy: Path | None = None
     no_pressure: bool = False
+    renew: bool = False
 
     def watch(self, sample_time: float, pressure: bool, start: float) -> "Watch":
         """Return the watch, which has already learnt the healthy log.
@@ -181,6 +184,19 @@ def _begin_or_resume(
     """Return a watch, resumed from its state file if there is one, and the piston travel so far [m]."""
     if state is None or not state.exists():
         return settings.watch(sample_time, pressure, start), 0.0
+    try:
+        return _resume(settings, sample_time, pressure, start, source, state)
+    except HydrostateError as error:
+        if not settings.renew:
+            raise
+        note(f"{source}: warning: {error}; so learning starts again")
+        return settings.watch(sample_time, pressure, start), 0.0
+
+
+def _resume(
+    settings: WatchSettings, sample_time: float, pressure: bool, start: float, source: str, state: Path
+) -> "tuple[Watch, float]":
+    """Return the watch that a state file continues, and the piston travel so far [m]."""
     import numpy as np
 
     from faults.watch.saved import load_state

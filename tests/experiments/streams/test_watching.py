@@ -254,3 +254,21 @@ def test_a_missing_column_gives_a_warning_from_the_rig_file_and_an_error_from_th
     wanted = replace(asked(), columns=bench.columns)
     with pytest.raises(LogError, match="DP"):
         watch_rows(WatchEvents(lambda _: None), [HEADER + "\n", *rows(0.0, 5.0)], wanted, "bench", None)
+
+
+def test_a_state_of_other_settings_is_refused_but_a_server_learns_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    state = tmp_path / "state.npz"
+    watched(rows(0.0, 70.0), state)
+    with pytest.raises(HydrostateError, match="false alarms; to learn again, delete its state file"):
+        watched(rows(70.0, 5.0), state, false_alarms=2.0)
+    for changes in ({"false_alarms": 2.0}, {"learning": LEARNT + 1.0}):
+        events, _ = watched(rows(70.0, 70.0), state, renew=True, **changes)
+        assert named(events) == ["start", "ready"]
+        assert "so learning starts again" in capsys.readouterr().err
+    events, _ = watched(rows(140.0, 70.0, T=0.02), state, renew=True)
+    assert named(events) == ["start", "ready"]
+    state.write_text("no archive")
+    events, _ = watched(rows(0.0, 70.0), state, renew=True)
+    assert named(events) == ["start", "ready"]
