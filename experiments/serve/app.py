@@ -154,7 +154,7 @@ def _answer_errors(app: FastAPI) -> None:
     def answered(request: Request, status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
         if wants_page(request.method, request.url.path, request.headers.get("accept", "")):
             policy = {"Content-Security-Policy": POLICY}
-            return HTMLResponse(refusal_page(detail), status, {**(headers or {}), **policy})
+            return HTMLResponse(refusal_page(detail, request.url.path), status, {**(headers or {}), **policy})
         return JSONResponse({"detail": detail}, status, headers)
 
     async def refused(request: Request, error: Exception) -> Response:

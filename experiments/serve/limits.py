@@ -8,7 +8,7 @@ import shutil
 import time
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -85,7 +85,10 @@ class Guard:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app, self._token = app, settings.token
-        self._names = {"localhost", "127.0.0.1", "::1", settings.host.lower()}
+        public = urlsplit((settings.url or "").lower())
+        self._origins = {public.netloc} - {""}
+        self._secure = "; Secure" if public.scheme == "https" else ""
+        self._names = {"localhost", "127.0.0.1", "::1", settings.host.lower(), public.hostname}
         self._loopback = is_loopback(settings.host)
         self._busy = 0
 
@@ -107,7 +110,7 @@ class Guard:
             again: list[tuple[bytes, bytes]] = [RETRY] if refused.status == 429 else []
             again += [CLOSE] if refused.status == 400 else []
             page = wants_page(scope["method"], scope["path"], headers.get(b"accept", b"").decode("latin-1"))
-            await exchange.answer(refused.status, refused.detail, again, page)
+            await exchange.answer(refused.status, refused.detail, again, scope["path"] if page else None)
         finally:
             self._busy -= 1
 
@@ -123,7 +126,8 @@ class Guard:
             raise RefusedError(421, f"this server answers for localhost alone, the request is for {host[:80]!r}")
         if scope["method"] not in ("GET", "HEAD", "OPTIONS"):
             origins = [value for name, value in scope["headers"] if name.lower() == b"origin"]
-            foreign = any(one.decode("latin-1").lower().partition("://")[2] != host for one in origins)
+            own = {host, *self._origins}
+            foreign = any(one.decode("latin-1").lower().partition("://")[2] not in own for one in origins)
             if foreign or headers.get(b"sec-fetch-site", b"none") not in (b"none", b"same-origin"):
                 raise RefusedError(403, "a page of another site may not change anything here")
         if self._token is None:
@@ -131,8 +135,9 @@ class Guard:
         if scope["path"] == "/" and b"token=" in scope["query_string"]:
             given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
             if _is_token(given, self._token):
-                cookie = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-                return [(b"location", b"/"), (b"set-cookie", cookie.encode())]
+                # no path: that of the address in the browser, which a proxy may have shortened
+                cookie = f"{COOKIE}={quote(self._token, safe='')}; HttpOnly; SameSite=Strict{self._secure}"
+                return [(b"location", b"./"), (b"set-cookie", cookie.encode())]
         if not (_is_token(_bearer(headers), self._token) or _is_token(_cookie(headers), self._token)):
             raise RefusedError(
                 401, "a token is needed: open the address that the server printed, or send a Bearer token"
@@ -151,7 +156,7 @@ def _bearer(headers: Mapping[bytes, bytes]) -> str:
 
 def _cookie(headers: Mapping[bytes, bytes]) -> str:
     parts = [part.strip().partition("=") for part in headers.get(b"cookie", b"").decode("latin-1").split(";")]
-    return next((value for name, _, value in parts if name == COOKIE), "")
+    return next((unquote(value) for name, _, value in parts if name == COOKIE), "")
 
 
 def _host_name(host: str) -> str:
@@ -191,13 +196,15 @@ class _Exchange:
             message = {"type": "http.response.body", "body": b"", "more_body": False}
         await self._send(message)
 
-    async def answer(self, status: int, detail: str, headers: list[tuple[bytes, bytes]], page: bool = False) -> None:
+    async def answer(
+        self, status: int, detail: str, headers: list[tuple[bytes, bytes]], page: str | None = None
+    ) -> None:
         if self._status:  # an answer has begun and cannot be replaced
             return
-        body = (refusal_page(detail) if page else json.dumps({"detail": detail})).encode()
-        kind = b"text/html; charset=utf-8" if page else b"application/json"
+        body = (json.dumps({"detail": detail}) if page is None else refusal_page(detail, page)).encode()
+        kind = b"application/json" if page is None else b"text/html; charset=utf-8"
         about = [(b"content-type", kind), (b"content-length", str(len(body)).encode())]
-        about += [(b"content-security-policy", POLICY.encode())] if page else []
+        about += [] if page is None else [(b"content-security-policy", POLICY.encode())]
         await self.send({"type": "http.response.start", "status": status, "headers": [*about, *headers]})
         await self.send({"type": "http.response.body", "body": body})
 

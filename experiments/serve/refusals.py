@@ -28,13 +28,21 @@ def wants_page(method: str, path: str, accept: str) -> bool:
     return method == "GET" and "text/html" in accept and not path.startswith("/api/")
 
 
-def refusal_page(detail: str) -> str:
-    """Return the page that gives the reason for a refusal."""
+def refusal_page(detail: str, path: str) -> str:
+    """Return the page that gives the reason for a refusal.
+
+    Parameters
+    ----------
+    path : str
+        Path that was asked for: the page of all logs is that many folders above it, also behind a proxy.
+    """
     said = html.escape(f"{detail[:1].upper()}{detail[1:].rstrip('.')}.")
+    home = "../" * (path.count("/") - 1) or "./"
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>Hydrostate: not shown</title>'
         '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">'
         f"<style>{STYLE}</style></head>"
-        f'<body><main><h1>This page cannot be shown.</h1><p>{said}</p><p><a href="/">All logs</a></p></main></body>'
+        f"<body><main><h1>This page cannot be shown.</h1><p>{said}</p>"
+        f'<p><a href="{home}">All logs</a></p></main></body>'
         "</html>\n"
     )

@@ -6,6 +6,7 @@ import logging
 import socket
 import sys
 from collections.abc import Callable
+from urllib.parse import quote
 
 import uvicorn
 
@@ -99,9 +100,8 @@ def _listening_socket(settings: Settings) -> socket.socket:
     except OSError as error:
         listener.close()
         taken = "; another server listens there" if error.errno == errno.EADDRINUSE else ""
-        raise HydrostateError(
-            f"{settings.host}:{settings.port}: cannot listen there: {error.strerror}{taken}"
-        ) from error
+        host = f"[{settings.host}]" if ":" in settings.host else settings.host
+        raise HydrostateError(f"{host}:{settings.port}: cannot listen there: {error.strerror}{taken}") from error
     return listener
 
 
@@ -109,6 +109,6 @@ def _address(settings: Settings, listener: socket.socket) -> str:
     port = listener.getsockname()[1]
     name = socket.gethostname() if settings.host in ANY_HOST else settings.host
     host = f"[{name}]" if ":" in name else name
-    token = f"?token={settings.token}" if settings.token else ""
+    token = f"?token={quote(settings.token, safe='')}" if settings.token else ""
     sys.stdout.flush()
-    return f"http://{host}:{port}/{token}"
+    return f"{settings.url.rstrip('/')}/{token}" if settings.url else f"http://{host}:{port}/{token}"

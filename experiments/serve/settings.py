@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from plant.errors import HydrostateError
 
@@ -30,6 +31,8 @@ class Settings:
         Address on which it listens.
     token : str or None
         Token that a client must present; None only if no other machine can connect.
+    url : str or None
+        Address at which browsers reach the server, if a proxy is in front.
     plant, rig, columns : str or None, Path or None, Mapping[str, str]
         Actuator of the logs, as on the command line.
     rigs : Path or None
@@ -60,13 +63,14 @@ class Settings:
     Raises
     ------
     HydrostateError
-        If a required token is missing or too short.
+        If a required token is missing or too short, or the address is none.
     """
 
     folder: Path
     host: str = "127.0.0.1"
     port: int = PORT
     token: str | None = None
+    url: str | None = None
     plant: str | None = None
     rig: Path | None = None
     rigs: Path | None = None
@@ -84,10 +88,16 @@ class Settings:
     false_alarms: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.token is None and not is_loopback(self.host):
-            raise HydrostateError(f"--host {self.host} can be reached from other machines, so a token is needed")
-        if self.token is not None and not (len(self.token) >= LEAST_TOKEN and self.token.isascii()):
-            raise HydrostateError(f"a token must have {LEAST_TOKEN} ASCII letters or digits at least")
+        if self.token is None and not (is_loopback(self.host) and self.url is None):
+            where = f"--host {self.host}" if self.url is None else f"--url {self.url}"
+            raise HydrostateError(f"{where} can be reached from other machines, so a token is needed")
+        if self.token is not None and not _is_usable(self.token):
+            raise HydrostateError(
+                f"a token must have at least {LEAST_TOKEN} ASCII letters, digits or signs, and neither begin nor end "
+                "with a blank"
+            )
+        if self.url is not None and not _is_address(self.url):
+            raise HydrostateError(f"--url must be http://HOST/ or https://HOST/PATH/, got {self.url!r}")
 
     @property
     def logs(self) -> Path:
@@ -108,6 +118,18 @@ class Settings:
     def database(self) -> Path:
         """Database file with the state and results of the logs."""
         return self.folder / "hydrostate.sqlite"
+
+
+def _is_usable(token: str) -> bool:
+    return len(token) >= LEAST_TOKEN and token.isascii() and token.isprintable() and token == token.strip()
+
+
+def _is_address(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0 and not parts.query
+    except ValueError:
+        return False
 
 
 def is_loopback(host: str) -> bool:

@@ -29,6 +29,9 @@ def serve(
         str | None,
         option("TEXT", "Token that clients must send; generated if one is needed.", envvar="HYDROSTATE_TOKEN"),
     ] = None,
+    url: Annotated[
+        str | None, option("URL", "Address at which browsers reach the server, if a proxy is in front of it.")
+    ] = None,
     watch: Annotated[
         list[str] | None,
         option("NAME=ADDRESS", "A stream to watch, such as press=tcp://HOST:PORT. Repeat it for more."),
@@ -87,13 +90,14 @@ def serve(
     if pattern is not None:
         by_pattern([], pattern)
     read_maintenance(maintenance)
-    if token is None and not is_loopback(host):
+    if token is None and not (is_loopback(host) and url is None):
         token = secrets.token_urlsafe(24)
     settings = Settings(
         folder=folder,
         host=host,
         port=port,
         token=token,
+        url=url,
         plant=plant,
         rig=None if rig is None else rig.resolve(),
         rigs=None if rigs is None else rigs.resolve(),

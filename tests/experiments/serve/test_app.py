@@ -120,7 +120,7 @@ def test_requests_without_the_token_are_refused(served: Served) -> None:
     assert client.get("/api/logs", headers={"authorization": "Bearer sixteen-letters-!"}).status_code == 200
     assert client.get("/api/logs", headers={"authorization": "Bearer sixteen-letters"}).status_code == 401
     entry = client.get("/", params={"token": "sixteen-letters-!"})
-    assert (entry.status_code, entry.headers["location"]) == (303, "/")
+    assert (entry.status_code, entry.headers["location"]) == (303, "./")
     assert {"HttpOnly", "SameSite=Strict"} <= set(entry.headers["set-cookie"].split("; "))
     assert client.get("/api/logs").status_code == 200  # the client keeps the cookie
 

@@ -11,7 +11,7 @@ BROWSER = {"accept": "text/html,*/*;q=0.8"}
 
 
 def test_a_refusal_page_escapes_the_text_of_the_request() -> None:
-    page = refusal_page("there is no <script>alert(1)</script>.")
+    page = refusal_page("there is no <script>alert(1)</script>.", "/fleet")
     assert "<script" not in page
     assert "There is no &lt;script&gt;" in page
 
@@ -36,7 +36,7 @@ def test_a_missing_query_parameter_is_named(served: Served) -> None:
 def test_a_refusal_page_is_accessible_in_light_and_dark_mode(browser: Any, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python")
     page = browser.new_page(viewport={"width": 390, "height": 800}, color_scheme=scheme)
-    page.set_content(refusal_page("there is no log 0000000000000000"))
+    page.set_content(refusal_page("there is no log 0000000000000000", "/fleet"))
     found = axe.Axe().run(page).response["violations"]
     assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
     page.close()
