@@ -5,7 +5,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from experiments.serve.jobs import Jobs
-from experiments.serve.store import UNFINISHED, StoredLog
+from experiments.serve.store import DONE, UNFINISHED, StoredLog
 
 Verb = Literal["diagnose", "estimate", "inspect"]
 
@@ -36,6 +36,7 @@ class Log(BaseModel):
     ended: float | None = Field(description="When the result was ready [s since 1970].")
     outcome: str | None = Field(description="ok, not_observable, mismatch, diverged or failed.")
     message: str | None = Field(description="The result in one sentence.")
+    page: bool = Field(description="Whether it has a page, at /logs/ID.")
 
 
 class Logs(BaseModel):
@@ -103,10 +104,6 @@ def log_of(kept: StoredLog, jobs: Jobs) -> Log:
     unfinished = kept.state == UNFINISHED
     phase = jobs.phase(kept.id) if unfinished else None
     state = ("waiting" if phase is None else "running") if unfinished else kept.state
-    return Log.model_validate(
-        {
-            **{name: getattr(kept, name) for name in Log.model_fields if name not in ("state", "phase")},
-            "state": state,
-            "phase": phase,
-        }
-    )
+    told = {name: getattr(kept, name) for name in Log.model_fields if name not in ("state", "phase", "page")}
+    page = kept.state == DONE and jobs.has_page(kept.id)
+    return Log.model_validate({**told, "state": state, "phase": phase, "page": page})

@@ -23,14 +23,7 @@ from experiments.log_pages.comparison import comparison_rows
 from experiments.serve.answers import Comparison, Health, Log, Logs, Refusal, StreamHistory, StreamState, Verb, log_of
 from experiments.serve.connection import ALL_SENT
 from experiments.serve.events import MOST_STREAM_VIEWS, event_stream
-from experiments.serve.limits import (
-    HEADERS,
-    MOST_UPLOADS,
-    Guard,
-    RefusedError,
-    receive_file,
-    require_size,
-)
+from experiments.serve.limits import HEADERS, MOST_UPLOADS, Guard, RefusedError, receive_file, require_size
 from experiments.serve.metrics import PROMETHEUS_TEXT, exposition
 from experiments.serve.pages import home_page, live_page, page_on_disk, policy_of
 from experiments.serve.refusals import POLICY, refusal_page, wants_page
@@ -219,6 +212,11 @@ def _offer_logs(app: FastAPI, service: Service) -> None:
     def result(id: Identity) -> dict[str, Any]:  # noqa: A002 - a path's name
         """Return the result of a log: the object that `hydrostate VERB --json` prints for it."""
         return service.result(id)
+
+    @app.post("/api/logs/{id}/again", status_code=202, responses=refusal_responses(404, 409, 413, 422), tags=["logs"])
+    def again(id: Identity) -> Log:  # noqa: A002 - a path's name
+        """Work on a finished log once more, such as one that failed, or whose page met a full disk."""
+        return log_of(service.again(id), service.jobs)
 
     @app.delete("/api/logs/{id}", status_code=204, responses=refusal_responses(404, 413, 422), tags=["logs"])
     def delete(id: Identity) -> None:  # noqa: A002 - a path's name

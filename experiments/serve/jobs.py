@@ -126,6 +126,10 @@ class Jobs:
             return phase_file(self._settings, identity).read_text(encoding="utf-8") or None
         return None
 
+    def has_page(self, identity: str) -> bool:
+        """Return whether a log has a page."""
+        return page_file(self._settings, identity).exists()
+
     def view(self, make: Callable[..., T], *args: Any) -> "Future[T]":
         """Make a page about several logs in another process.
 

@@ -157,6 +157,28 @@ class Service:
             raise RefusedError(404, f"there is no page of {log.name}. {log.message}")
         return path
 
+    def again(self, identity: str) -> StoredLog:
+        """Put a finished log into the queue once more.
+
+        Raises
+        ------
+        RefusedError
+            If there is none, its file is gone, it is not finished, or the queue or the disk is full.
+        """
+        log = self.require_log(identity)
+        if not log_file(self.settings, identity).exists():
+            raise RefusedError(404, f"the file of {log.name} is no longer on the server")
+        self.require_place()
+        try:
+            finished = self.store.reopen(identity)
+        except HydrostateError as error:
+            raise RefusedError(413, f"the server's folder takes no more: {error}") from error
+        if not finished:
+            raise RefusedError(409, f"the work on {log.name} is not finished yet")
+        found = self.require_log(identity)
+        self.jobs.submit(found)
+        return found
+
     def delete(self, identity: str) -> None:
         """Delete a log with its results.
 

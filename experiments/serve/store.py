@@ -190,6 +190,18 @@ class Store:
                 (state, time.time(), result["outcome"], said or result["message"], text, told, identity),
             )
 
+    def reopen(self, identity: str) -> bool:
+        """Forget what came of a log, so that it is processed again; return whether it was finished."""
+        with self._transaction() as connection:
+            return (
+                connection.execute(
+                    "UPDATE logs SET state = :new, tries = 0, ended = NULL, outcome = NULL, message = NULL, "
+                    "result = NULL, entries = NULL WHERE id = :id AND state != :new",
+                    {"new": UNFINISHED, "id": identity},
+                ).rowcount
+                > 0
+            )
+
     def result(self, identity: str) -> dict[str, Any] | None:
         """Return the result of a log as entries of the JSON contract; None if it is not ready."""
         rows = self._query("SELECT result FROM logs WHERE id = ?", identity)

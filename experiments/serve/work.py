@@ -43,7 +43,9 @@ INSPECTION_MESSAGES: Mapping[bool, str] = {
 }
 """Result of an inspection, by whether the log can be read with the guessed columns."""
 
-DISK_FULL = "the disk of the server is full, so its page could not be written: make room, then drop this log again"
+DISK_FULL = "the disk of the server is full: make room, then choose Again"
+
+PAGE_MISSING = "Its page could not be written, because the disk of the server is full: make room, then choose Again."
 
 NO_MEMORY = 77
 """Exit code of a process whose log needed more memory than there is. The process ends, since the memory that it still
@@ -142,10 +144,11 @@ def process_log(task: Task) -> LogResult:
         except HydrostateError as error:
             worked = _failed(task, blank, error.message if error.source == str(task.log) else str(error))
         except Exception as error:  # report any error of a log to its sender
-            full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-            worked = _failed(task, blank, DISK_FULL if full else error_sentence(error))
+            worked = _failed(task, blank, DISK_FULL if _is_full(error) else error_sentence(error))
     result = plain({"file": task.name, **with_remarks(worked.result, said)})
     said = worked.said or plain_words(result) or sentence(str(result.get("message") or ""))
+    if result["outcome"] != "failed" and not task.page.exists():
+        said = f"{said} {PAGE_MISSING}"
     entries = _without_path(plain(worked.entries), task)
     return LogResult(_without_path(result, task), entries, _without_path(said, task))
 
@@ -231,9 +234,19 @@ def _failed(task: Task, blank: Mapping[str, Any], message: str) -> LogResult:
     return LogResult({**blank, "outcome": "failed", "message": clauses([message])}, entries)
 
 
+def _is_full(error: Exception) -> bool:
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 def _write(task: Task, page: str) -> None:
-    with replacing(task.page) as file:
-        file.write(page.encode())
+    """Write the page of a log; on a full disk there is none, but the result is not lost."""
+    try:
+        with replacing(task.page) as file:
+            file.write(page.encode())
+    except OSError as error:
+        if not _is_full(error):
+            raise
+        task.page.unlink(missing_ok=True)  # it would be that of an earlier result
     if not task.log.exists():  # the log and its results were deleted meanwhile
         task.page.unlink(missing_ok=True)
 

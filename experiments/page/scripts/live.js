@@ -26,6 +26,8 @@
   const charts = new Map();
   let received = null; // when the latest gauges were, by this browser's clock [ms]
   let streaming = false;
+  let silent = false; // no row has arrived for a while
+  let told = null; // the state, as the server told it last
   let points = [];
   let dirty = false;
 
@@ -57,16 +59,22 @@
     const words = seconds < 120 ? `${seconds} s` : `${Math.round(seconds / 60)} min`;
     const said = quiet.hidden ? "" : `No row has arrived for ${words}: the numbers below are old, and nothing is watched.`;
     if (quiet.textContent !== said) quiet.textContent = said;
+    if (silent === quiet.hidden && told !== null) {
+      silent = !quiet.hidden;
+      showState(told);
+    }
   }
 
   function showState(one) {
+    told = one;
     streaming = ["learning", "watching"].includes(one.state);
     const said = one.message.startsWith(one.state) ? one.message : [one.state, one.message].filter(Boolean).join(": ");
     const raised = one.events.filter((event) => event.event === "alarm");
     const last = raised.at(-1);
     const count = raised.length === 1 ? "1 alarm" : `${raised.length} alarms`;
     const before = last ? `${count}, the last at ${clock(last.received)}: ${last.message}. ` : "";
-    const now = last && one.state === "watching" ? "Watching" : said;
+    const watching = last && one.state === "watching" ? "Watching" : said;
+    const now = silent && streaming ? "Waiting for rows" : watching;
     const again = ["failed", "ended"].includes(one.state) ? " It is tried again every few seconds." : "";
     state.textContent = `${before}${now[0].toUpperCase()}${now.slice(1)}.${again}`;
     state.classList.toggle("alarmed", raised.length > 0);

@@ -27,10 +27,10 @@
     return made;
   }
 
-  // Delete a log; returns why not, where it was not.
-  async function removed(id) {
+  // Delete a log, or have it worked on again; returns why not, where it was not.
+  async function askedOf(id, method, more = "") {
     try {
-      const answer = await fetch(`api/logs/${id}`, { method: "DELETE" });
+      const answer = await fetch(`api/logs/${id}${more}`, { method });
       return answer.ok || answer.status === 404 ? "" : (await answer.json()).detail;
     } catch (error) {
       return `the server does not answer: ${error.message}`;
@@ -44,7 +44,7 @@
 
   function row(log) {
     const named = element("th", { scope: "row", class: "name" });
-    named.append(log.state === "done" ? element("a", { href: `logs/${log.id}` }, log.name) : log.name);
+    named.append(log.page ? element("a", { href: `logs/${log.id}` }, log.name) : log.name);
     const tick = element("input", { type: "checkbox", "aria-label": `Compare ${log.name}` });
     tick.checked = ticked.has(log.id);
     tick.disabled = log.state !== "done" || log.verb === "inspect"; // which has no quantities
@@ -56,16 +56,26 @@
     const remove = element("button", { type: "button", "aria-label": `Delete ${log.name}` }, "Delete");
     remove.addEventListener("click", async () => {
       if (!window.confirm(`Delete ${log.name} and what came of it?`)) return;
-      const why = await removed(log.id);
+      const why = await askedOf(log.id, "DELETE");
       refused = why ? `${log.name} was not deleted: ${why}` : "";
       ticked.delete(log.id);
       await look();
     });
+    const state = element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`);
+    if (!["waiting", "running"].includes(log.state) && !log.page) {
+      const again = element("button", { type: "button", "aria-label": `Work on ${log.name} again` }, "Again");
+      again.addEventListener("click", async () => {
+        const why = await askedOf(log.id, "POST", "/again");
+        refused = why ? `${log.name} is not worked on again: ${why}` : "";
+        await look();
+      });
+      state.append(" ", again);
+    }
     return element(
       "tr",
       {},
       named,
-      element("td", { "data-head": "state", class: log.state === "failed" ? "bad" : "" }, `${stateWords(log)} (${log.verb})`),
+      state,
       element("td", { "data-head": "verdict" }, (log.message ?? "").replaceAll(" %", "\u00a0%")),
       element("td", { "data-head": "compare" }, tick),
       element("td", { "data-head": "delete" }, remove),

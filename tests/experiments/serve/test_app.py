@@ -264,7 +264,7 @@ def test_a_refusal_is_a_page_for_a_browser_and_data_for_a_program(served: Served
     page = client.get(path, headers={"Accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
     assert (page.status_code, page.headers["content-type"]) == (status, "text/html; charset=utf-8")
     assert "<h1>This page cannot be shown.</h1>" in page.text
-    assert '<a href="/">All logs</a>' in page.text
+    assert '<a href="./">All logs</a>' in page.text
     assert "should match pattern" not in page.text
     assert set(client.get(path).json()) == {"detail"}
 

@@ -94,16 +94,29 @@ def test_an_internal_error_is_a_failed_result(stack_log: Path, tmp_path: Path, m
     assert "internal error" in found.result["message"]
 
 
-def test_a_full_disk_is_no_error_of_the_program(
+def full(*_: Any) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_a_full_disk_costs_the_page_and_not_the_result(
     stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_: Any) -> None:
-        raise OSError(28, "No space left on device")
-
+    (tmp_path / "page.html").write_text("of an earlier result")
     monkeypatch.setattr(work, "replacing", full)
     found = process_log(task(stack_log, tmp_path))
+    assert (found.result["outcome"], found.result["condition"]) == ("ok", "major_leakage")
+    assert found.entries is not None
+    assert found.said.endswith(work.PAGE_MISSING)
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_disk_that_is_full_before_the_page_is_no_error_of_the_program(
+    stack_log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work, "read_log", full)
+    found = process_log(task(stack_log, tmp_path))
     assert found.result["outcome"] == "failed"
-    assert "make room, then drop this log again" in str(found.result["message"])
+    assert work.DISK_FULL[1:] in str(found.result["message"])
     assert "report" not in str(found.result["message"])
 
 
