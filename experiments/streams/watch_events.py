@@ -171,9 +171,12 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
 def _alarm_message(event: "Alarm") -> str:
     from faults.watch.events import LOSS_BALANCE
 
+    first, last = event.interval
     if event.balance == LOSS_BALANCE:
-        return f"leakage has grown by more than warm oil explains, since about {event.since:.0f} s of the stream"
-    return f"the {event.balance} balance changed at {event.since:.2f} s of the stream: {BALANCES[event.balance]}"
+        when = f"since about {event.since:.0f} s of the stream (95 % interval {first:.0f} to {last:.0f} s)"
+        return f"leakage has grown by more than warm oil explains, {when}"
+    when = f"{event.since:.2f} s of the stream (95 % interval {first:.2f} to {last:.2f} s)"
+    return f"the {event.balance} balance changed at {when}: {BALANCES[event.balance]}"
 
 
 def _reading(event: "Change") -> str:
