@@ -1,8 +1,9 @@
 """Excitation of a block by the drive: scores are compared with those of similarly excited blocks.
 
-A balance's residual depends on the drive: it is larger after a reversal than in steady motion. Blocks fall into
-classes, in octaves of the change of speed in the block and in the block before. Each class has its own usual log NIS,
-so the drive's pattern raises no score, and a new kind of drive is learnt before it is judged.
+A balance's residual depends on the drive: it is larger after a reversal than in steady motion, and the balance fits one
+amplitude better than another. Blocks fall into classes, by the octaves of the change of speed in the block and in the
+block before, or that the actuator stood still before, and by mean speed. Each class has its own usual log NIS, so the
+drive's pattern raises no score, and a new kind of drive is learnt before it is judged.
 """
 
 import math
@@ -15,9 +16,16 @@ OCTAVES = 13
 STILL = 1e-3
 """Excitation below which a block counts as steady: a change of speed by 3 % of rated speed, squared [dimensionless]."""
 
-MEAN, VARIANCE, COUNT = range(3)
-"""Indices in the usual values of a class: mean and variance of its log NIS, and its number of blocks, up to the
-memory."""
+SPEED_CLASSES, SPEED_RATIO, SLOWEST_SPEED = 17, 1.25, 0.05
+"""Number of classes by mean speed, the factor from one to the next, and the end of the first, relative to the rated
+speed [fraction]."""
+
+MEAN, VARIANCE, COUNT, LAST_BLOCK = range(4)
+"""Indices in the usual values of a class: mean and variance of its log NIS, its number of blocks, up to the memory, and
+its last block."""
+
+STALE = 8.0
+"""Memories after which a class that did not occur is learnt again: the balances have forgotten its drive."""
 
 LARGEST_SCORE = 8.0
 """Cap of a block's score [standard deviations]: no single block decides."""
@@ -31,7 +39,14 @@ def excitation_octave(change: float) -> int:
     return min(max(int(math.log(change / STILL + 1.0) / math.log(2.0)), 0), OCTAVES - 1)
 
 
-def standardise(value: float, memory: float, judged: bool, least: float, usual: Array) -> float:
+def speed_class(fast: float) -> int:
+    """Return the class of a block's mean speed, which is relative to the rated speed."""
+    if fast <= SLOWEST_SPEED:
+        return 0
+    return min(1 + int(math.log(fast / SLOWEST_SPEED) / math.log(SPEED_RATIO)), SPEED_CLASSES - 1)
+
+
+def standardise(value: float, memory: float, judged: bool, least: float, now: float, usual: Array) -> float:
     """Return how far a log NIS exceeds the usual value of its class, and update the usual value.
 
     Parameters
@@ -44,14 +59,19 @@ def standardise(value: float, memory: float, judged: bool, least: float, usual: 
         Whether the block counts; 0 is returned otherwise, and while too few blocks of the class are known.
     least : float
         Least standard deviation of the class [dimensionless].
-    usual : ndarray, shape (3,)
-        Mean, variance and count of the class.
+    now : float
+        Blocks in motion so far [count].
+    usual : ndarray, shape (4,)
+        Mean, variance, count and last block of the class; a class that did not occur for long is learnt again.
 
     Returns
     -------
     float
         The score [standard deviations].
     """
+    if now - usual[LAST_BLOCK] > STALE * memory:
+        usual[COUNT] = 0.0
+    usual[LAST_BLOCK] = now
     away, score = value - usual[MEAN], 0.0
     if judged and usual[COUNT] >= LEAST_BLOCKS:
         score = min(away / max(math.sqrt(usual[VARIANCE] + 1e-12), least), LARGEST_SCORE)

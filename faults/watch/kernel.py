@@ -13,7 +13,7 @@ import numpy as np
 from faults.watch import balances, cusum, excitation, loss, memory, resolution
 from faults.watch.balances import FEATURES, W1, count_gains, learn, regress, shift, solve
 from faults.watch.cusum import PEAK, SQUARES, SUM, THRESHOLD, accumulate, threshold, white_threshold
-from faults.watch.excitation import MEAN, OCTAVES, excitation_octave, standardise
+from faults.watch.excitation import MEAN, OCTAVES, SPEED_CLASSES, excitation_octave, speed_class, standardise
 from faults.watch.loss import (
     BLOCKS,
     DELAYS,
@@ -35,6 +35,7 @@ from faults.watch.loss import (
 from faults.watch.memory import (
     ALL,
     CHANGED,
+    FAST_SUM,
     LEARNT_FROM,
     MOVED,
     OCTAVE,
@@ -114,6 +115,7 @@ def advance(rows: Array, first: int, setting: WatchSetting, sizes: WatchSizes, m
             if partial[SOUND] > 3.0 and abs(w) + abs(lags[W1]) + abs(v) > MOVING:
                 partial[MOVED] += 1.0
                 partial[CHANGED] += (w - lags[W1]) ** 2
+                partial[FAST_SUM] += abs(w)
                 for c in range(score.shape[0]):
                     error = learn(c, features, target, setting.fade, memory.information, memory.moment, memory.found)
                     score[c, SQUARES] += error * error
@@ -137,13 +139,15 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
     """Judge a whole block; return its result."""
     partial, clock, score, peaks, known = memory.partial, memory.clock, memory.score, memory.peaks, memory.known
     moved, recent, octave = partial[MOVED], memory.scores.shape[1], excitation_octave(partial[CHANGED])
-    excited = octave * OCTAVES + int(partial[OCTAVE])
-    partial[MOVED] = partial[WHOLE] = partial[CHANGED] = 0.0
+    fast = speed_class(partial[FAST_SUM] / max(moved, 1.0))
+    excited = (octave * (OCTAVES + 1) + int(partial[OCTAVE])) * SPEED_CLASSES + fast
+    partial[MOVED] = partial[WHOLE] = partial[CHANGED] = partial[FAST_SUM] = 0.0
     partial[OCTAVE] = octave
     place = int(clock[ALL]) % recent
     clock[ALL] += 1.0
     memory.gains[int(clock[ALL]) % recent, :] = 0.0
     if 2.0 * moved < INTERVALS:
+        partial[OCTAVE] = OCTAVES
         memory.scores[:, place] = np.nan
         score[:, SQUARES] = 0.0
         return NOTHING
@@ -197,7 +201,8 @@ def score_balances(
         solve(memory.information[c], memory.moment[c], memory.found[c], factor)
         if since > sizes.settle:
             usual, judged = memory.usual[c, excited], since > 2.0 * sizes.settle
-            u = standardise(value, setting.score_memory, judged, least_deviation(rounding, usual[MEAN]), usual)
+            least = least_deviation(rounding, usual[MEAN])
+            u = standardise(value, setting.score_memory, judged, least, clock[USABLE], usual)
             memory.scores[c, place] = u
             if since > sizes.resume:
                 accumulate(score[c], peaks[c], u, ALLOWANCE, LEVEL)
@@ -276,6 +281,7 @@ def watch_kernel() -> NativeKernel:
         solve,
         accumulate,
         excitation_octave,
+        speed_class,
         standardise,
         white_threshold,
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from faults.watch.balances import FEATURES, GAINS
 from faults.watch.cusum import THRESHOLD
-from faults.watch.excitation import OCTAVES
+from faults.watch.excitation import OCTAVES, SPEED_CLASSES
 from faults.watch.loss import DELAYS, LIMIT, SEEN, WANTED, WORK
 from faults.watch.resolution import BEFORE, LEAST_STEP
 from plant.arrays import Array
@@ -20,13 +20,13 @@ LEVELS = 4096
 KEPT_SPANS = 512
 """Number of spans whose loss is remembered."""
 
-PARTIAL, CLOCK, LAGS, SCORE = 9, 4, 8, 4
+PARTIAL, CLOCK, LAGS, SCORE = 10, 4, 8, 4
 """Lengths of arrays: the current interval and block, the clock, the last intervals, and a balance's score."""
 
-SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE = range(PARTIAL)
+SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE, FAST_SUM = range(PARTIAL)
 """Indices in the current interval and block: samples of the interval, their sums of speed [rad/s] and pressure [Pa],
 and position at its beginning [m]; consecutive sound intervals; intervals of the block in which the actuator moved, and
-all its intervals; its sum of squared speed changes, and the octave of the last block."""
+all its intervals; its sum of squared speed changes, the octave of the last block, and the sum of speeds."""
 
 ALL, USABLE, LEARNT_FROM, SCORED = range(CLOCK)
 """Indices in the clock: blocks so far, those in motion, the number of these when learning last restarted, and those
@@ -38,7 +38,7 @@ class Memory(NamedTuple):
 
     Parameters
     ----------
-    partial : ndarray, shape (9,)
+    partial : ndarray, shape (10,)
         The current interval and block, by index: see `SAMPLES`.
     clock : ndarray, shape (4,)
         Counters of blocks [count], by index: see `ALL`.
@@ -56,7 +56,7 @@ class Memory(NamedTuple):
         Scores of the last blocks.
     gains : ndarray, shape (recent, gains)
         Gain sums of the last blocks.
-    usual : ndarray, shape (balances, classes, 3)
+    usual : ndarray, shape (balances, classes, 4)
         Usual values of each class, as in `faults.watch.excitation`.
     work : ndarray, shape (5,)
         Sums of the current span, with pressure.
@@ -142,7 +142,7 @@ def empty_memory(balances: int, loss_threshold: float) -> Memory:
     shapes = (
         *((PARTIAL,), (CLOCK,), (LAGS,)),
         *((balances, *shape) for shape in balance),
-        *((RECENT, GAINS), (balances, OCTAVES**2, 3), *slow),
+        *((RECENT, GAINS), (balances, OCTAVES * (OCTAVES + 1) * SPEED_CLASSES, 4), *slow),
     )
     memory = Memory._make(np.zeros(shape) for shape in shapes)
     memory.partial[POSITION] = np.nan

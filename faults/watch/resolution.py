@@ -24,6 +24,10 @@ WHITE = 0.45
 """Standard deviation of the log NIS of ten intervals of white noise: the root of 2/10 [dimensionless]."""
 
 
+TIGHTEST = 0.15
+"""Least standard deviation of any class's log NIS [dimensionless]: a residual that grows by 8 % is no fault; judged."""
+
+
 def find_step(value: float, rating: float, column: int, steps: Array) -> None:
     """Compare a sample with the last one, and keep the smallest step of its channel.
 
@@ -69,7 +73,7 @@ def unresolved(balance: int, balances: int, steps: Array) -> float:
 
 
 def least_deviation(rounding: float, usual: float) -> float:
-    """Return the least standard deviation of a class's log NIS, given the share of rounding in its usual NIS.
+    """Return the least standard deviation of a class's log NIS, more by the share of rounding in its usual NIS.
 
     Parameters
     ----------
@@ -78,4 +82,5 @@ def least_deviation(rounding: float, usual: float) -> float:
     usual : float
         Usual log NIS of the class [dimensionless].
     """
-    return WHITE * min(rounding * math.exp(-usual), 1.0) if rounding > 0.0 else 0.0
+    share = min(rounding * math.exp(-usual), 1.0) if rounding > 0.0 else 0.0
+    return max(WHITE * share, TIGHTEST)

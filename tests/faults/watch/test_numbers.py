@@ -10,7 +10,7 @@ from faults.watch import loss
 from faults.watch.balances import FEATURES, GAINS, count_gains, learn, regress, shift, solve
 from faults.watch.cusum import accumulate, threshold, white_threshold
 from faults.watch.events import Alarm, Event, Ready, change_time
-from faults.watch.excitation import LEAST_BLOCKS, OCTAVES, excitation_octave, standardise
+from faults.watch.excitation import LEAST_BLOCKS, OCTAVES, excitation_octave, speed_class, standardise
 from faults.watch.growth import growth_time
 from faults.watch.loss import (
     DELAYS,
@@ -104,17 +104,18 @@ def sums_of_scores_and_their_thresholds() -> dict[str, Any]:
 
 @NUMBERS.case()
 def excitation_and_standard_scores() -> dict[str, Any]:
-    usual, scores = np.zeros(3), []
+    usual, scores = np.zeros(4), []
     for k, value in enumerate(0.5 + 0.3 * np.sin(1.7 * np.arange(60.0)) + 0.9 * (np.arange(60) == 50)):
-        scores.append(standardise(float(value), 30.0, k > 10, 0.0, usual))
+        scores.append(standardise(float(value), 30.0, k > 10, 0.0, float(k), usual))
     return {
         "octaves": [excitation_octave(change) for change in (0.0, 5e-4, 1.1e-3, 0.02, 0.9, 3.0, 1e4)],
         "count of octaves": OCTAVES,
+        "classes by speed": [speed_class(fast) for fast in (0.0, 0.05, 0.051, 0.1, 0.5, 1.0, 1.3, 9.0)],
         "blocks before a score": LEAST_BLOCKS,
         "scores": [scores[place] for place in (5, 19, 20, 21, 35, 50, 59)],
         "mean, variance, count": usual,
-        "largest score": standardise(1e6, 30.0, True, 0.0, usual),
-        "score with a least deviation": standardise(1.5, 30.0, True, 0.9, np.array([0.5, 0.04, 30.0])),
+        "largest score": standardise(1e6, 30.0, True, 0.0, 60.0, usual),
+        "score with a least deviation": standardise(1.5, 30.0, True, 0.9, 60.0, np.array([0.5, 0.04, 30.0, 59.0])),
     }
 
 

@@ -11,6 +11,7 @@ from faults.watch.resolution import (
     PLACE,
     PRESSURE,
     SPEED,
+    TIGHTEST,
     WHITE,
     find_step,
     least_deviation,
@@ -51,8 +52,8 @@ def test_rounding_is_that_of_the_channels_in_a_balance_and_a_set_point_is_no_rou
 def test_a_class_of_nothing_but_rounding_scatters_like_white_noise_and_a_clear_one_as_it_does() -> None:
     assert least_deviation(1e-4, float(np.log(1e-4))) == pytest.approx(WHITE)
     assert least_deviation(1e-4, float(np.log(1e-6))) == pytest.approx(WHITE)
-    assert least_deviation(1e-4, float(np.log(1e-2))) == pytest.approx(0.01 * WHITE)
-    assert least_deviation(0.0, -800.0) == 0.0
+    assert least_deviation(1e-4, float(np.log(2e-4))) == pytest.approx(0.5 * WHITE)
+    assert least_deviation(1e-4, float(np.log(1e-2))) == least_deviation(0.0, -800.0) == TIGHTEST
 
 
 def creeping(leak_from: float, seconds: float) -> np.ndarray:
