@@ -28,6 +28,7 @@
   let streaming = false;
   let silent = false; // no row has arrived for a while
   let told = null; // the state, as the server told it last
+  let lost = false; // the server does not answer
   let points = [];
   let dirty = false;
 
@@ -59,7 +60,7 @@
     const words = seconds < 120 ? `${seconds} s` : `${Math.round(seconds / 60)} min`;
     const said = quiet.hidden ? "" : `No row has arrived for ${words}: the numbers below are old, and nothing is watched.`;
     if (quiet.textContent !== said) quiet.textContent = said;
-    if (silent === quiet.hidden && told !== null) {
+    if (silent === quiet.hidden && told !== null && !lost) {
       silent = !quiet.hidden;
       showState(told);
     }
@@ -67,6 +68,7 @@
 
   function showState(one) {
     told = one;
+    lost = false;
     streaming = ["learning", "watching"].includes(one.state);
     const said = one.message.startsWith(one.state) ? one.message : [one.state, one.message].filter(Boolean).join(": ");
     const raised = one.events.filter((event) => event.event === "alarm");
@@ -181,6 +183,7 @@
   });
   source.addEventListener("state", (event) => showState(JSON.parse(event.data)));
   source.addEventListener("error", () => {
+    lost = true;
     state.textContent = "The server does not answer; the view continues when it does.";
   });
   setInterval(() => {

@@ -288,6 +288,35 @@ def test_the_live_view_says_that_rows_have_stopped(opened: Any, state: str, age:
     quiet = page.locator(".live-quiet")
     assert quiet.is_visible() is bool(words)
     assert quiet.inner_text().startswith(words) or not words
+    # the stream of events has ended, and this stays in sight
+    assert page.locator(".live-state").inner_text().startswith("The server does not answer")
+
+
+def test_a_silent_stream_waits_for_rows_and_is_watched_again_when_they_come(opened: Any) -> None:
+    gauge = {"time_s": 1.0, "rows": 9, "gaps": 0, "left_out": 0, "number": 1, "received": 1.7e9}
+    gauge |= {"values": {"a_pa": 1.0}, "low": {"a_pa": 1.0}, "high": {"a_pa": 1.0}, "scores": {}, "thresholds": {}}
+    told = {
+        "name": "bench",
+        "state": "watching",
+        "message": "",
+        "gauges": None,
+        "history": [gauge],
+        "now": 1.7e9 + 72.0,
+    }
+    page = opened("live")
+    page.add_init_script(
+        "window.EventSource = class { constructor() { window.events = new EventTarget() }"
+        "addEventListener(name, take) { window.events.addEventListener(name, take) } };"
+        "window.tell = (name, data) => window.events.dispatchEvent(new MessageEvent(name, { data }))"
+    )
+    page.reload()
+    state = page.locator(".live-state")
+    page.evaluate("([name, data]) => tell(name, data)", ["history", json.dumps({**told, "events": []})])
+    page.wait_for_selector(".live-quiet:not([hidden])")
+    assert state.inner_text() == "Waiting for rows."
+    page.evaluate("([name, data]) => tell(name, data)", ["gauges", json.dumps({**gauge, "time_s": 2.0})])
+    page.wait_for_selector(".live-quiet", state="hidden")
+    assert state.inner_text() == "Watching."
 
 
 def test_negative_gauges_have_a_minus_sign_and_a_balance_being_learnt_has_no_chart(opened: Any) -> None:
