@@ -156,6 +156,9 @@ def _oil_flows(state: State, pressure: StackPressures, p: StackValues) -> State:
     density_high, density_low = n_ch / high, n_cl / low
     density_acc = 1.0 / specific_volume(pressure.accumulator, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
 
+    lost = p.chamber_leakage * (pressure.chamber - pressure.accumulator)
+    crossed = p.crossport_leakage * (pressure.high - pressure.low)
+
     def past_reed(drop: Scalar, opening: Scalar, before: Scalar, behind: Scalar) -> Scalar:
         reed = p.reed_perimeter, p.discharge_coefficient, p.density, p.laminar_drop
         return reed_flow(drop, opening, *reed) * where(drop > 0.0, before, behind)
@@ -166,8 +169,8 @@ def _oil_flows(state: State, pressure: StackPressures, p: StackValues) -> State:
         q_h * where(q_h > 0.0, density_th, density_high),
         q_1 * where(q_1 > 0.0, density_low, density_acc),
         q_2 * where(q_2 > 0.0, density_acc, density_tl),
-        p.chamber_leakage * (pressure.chamber - pressure.accumulator) * filled,
-        p.crossport_leakage * (pressure.high - pressure.low) * density_high,
+        lost * where(lost > 0.0, filled, density_acc),
+        crossed * where(crossed > 0.0, density_high, density_low),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.peers.stiff_solvers import reference_trajectory
+from plant.components.oil import specific_volume
 from plant.errors import DriveError, HydrostateError, RigError
 from plant.piezo_stack.flow import STAGES, line_reynolds_numbers, mean_flow, output_flow, stages
 from plant.piezo_stack.model import OIL, STATES, at_bias, stack_derivative, stack_pressures
@@ -39,6 +40,27 @@ def test_no_oil_is_lost(gas: float) -> None:
     states = run_stack(replace(LOADED, accumulator_gas=gas, chamber_leakage=1e-11), DRIVE, FINE_TIME)
     oil = states[:, list(OIL)].sum(axis=1)
     assert np.ptp(oil) < 1e-12 * oil[0]
+
+
+@pytest.mark.parametrize(
+    ("leak", "empty", "full"),
+    [
+        ("chamber_leakage", "oil_chamber_m3", "oil_accumulator_m3"),
+        ("crossport_leakage", "oil_low_side_m3", "oil_high_side_m3"),
+        ("crossport_leakage", "oil_high_side_m3", "oil_low_side_m3"),
+    ],
+)
+def test_a_leak_has_the_density_of_the_side_that_it_comes_from(leak: str, empty: str, full: str) -> None:
+    p = HEALTHY
+    state = at_bias(p)
+    state[STATES.index(empty)] *= 0.5  # vapour fills the rest
+    tight, leaking = (
+        np.array(stack_derivative(tuple(state), 0.0, 0.0, replace(p, **{leak: value}))) for value in (0.0, 1e-11)
+    )
+    density = 1.0 / specific_volume(p.bias_pressure, p.bulk_modulus, p.air_fraction, p.vapour_pressure)
+    flow = (leaking - tight)[STATES.index(empty)]
+    assert flow == pytest.approx(1e-11 * p.bias_pressure * density, rel=5e-3)
+    assert (tight - leaking)[STATES.index(full)] == flow
 
 
 def test_the_actuator_at_bias_without_drive_only_lets_its_rod_sink_under_gravity() -> None:
