@@ -8,7 +8,7 @@ import numpy as np
 from plant.arrays import Array, Tones
 from plant.diaphragm_motor.model import FLOWS, SIDE_A, SIDE_B, VELOCITY, deflections
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor.run import LONGEST_STEP, motor_drive, run_motor
+from plant.diaphragm_motor.run import LONGEST_STEP, motor_drive, require_liquid, run_motor
 
 SETTLING_TIME = 0.08
 """Settling time of a run, rounded up to whole cycles [s]."""
@@ -121,7 +121,7 @@ def operate(
     DriveError
         If the diaphragms do not take the drive.
     HydrostateError
-        If the state stops being finite.
+        If the state stops being finite, or a place is out of liquid once settled.
 
     Examples
     --------
@@ -137,6 +137,7 @@ def operate(
     drive = motor_drive(frequency, peak_to_peak, (settling + measured) * between, between)
     states = run_motor(p, drive, between, longest_step=longest_step, start=start)[settling:-1]
     began = settling * between
+    require_liquid(states, p, between, began)
     bent = deflections(states, drive[settling:-1], p) * p.sensing_gain * np.array(p.sensor_gain)
     first, second = (
         tone(bent, between, order * frequency, began) / (1.0 - 1j * p.sensing_corner / (order * frequency))

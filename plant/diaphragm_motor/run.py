@@ -10,9 +10,20 @@ import numpy as np
 from scipy.signal import lfilter
 
 from plant.arrays import Array
-from plant.diaphragm_motor.model import POSITION, STATES, MotorRow, at_rest, deflections, motor_row, motor_step
+from plant.diaphragm_motor.model import (
+    POSITION,
+    PRESSURES,
+    SIDE_A,
+    SIDE_B,
+    STATES,
+    MotorRow,
+    at_rest,
+    deflections,
+    motor_row,
+    motor_step,
+)
 from plant.diaphragm_motor.parameters import DIAPHRAGMS, DiaphragmMotorParameters
-from plant.errors import DriveError
+from plant.errors import DriveError, HydrostateError
 from plant.log.record import Record
 from plant.runs import checked_series, require_drivable, require_finite, sample_count, steps_a_sample, with_noise
 from plant.sensors.sensors import require_not_negative
@@ -47,6 +58,9 @@ ELECTRODES = tuple(f"electrode_{i}_v" for i in range(1, DIAPHRAGMS + 1))
 """Channels of the sensing electrodes, ordered from the inlet."""
 
 JUDGED = "judged, errata M22"
+
+_ROUNDING = 1e-12
+"""Fraction of the supply pressure by which the least pressure may be missed due to rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +183,40 @@ def run_motor(
     return states
 
 
+def require_liquid(states: Array, parameters: DiaphragmMotorParameters, sample_time: float, begin: float = 0.0) -> None:
+    """Raise an error if a place of a run ran out of liquid (errata M22).
+
+    The model then holds its pressure, and does not count the vapour that has to be filled before the pressure rises.
+
+    Parameters
+    ----------
+    states : ndarray, shape (n, 28)
+        As named in `plant.diaphragm_motor.model.STATES`.
+    sample_time : float
+        Seconds between samples [s].
+    begin : float
+        Time of the first sample [s].
+
+    Raises
+    ------
+    HydrostateError
+        If a chamber or a side of the cylinder is at the least pressure.
+    """
+    p = parameters
+    lowest = p.least_pressure - p.supply_pressure
+    places = np.column_stack([states[:, PRESSURES], states[:, [SIDE_A, SIDE_B]]])
+    dry = places <= lowest + _ROUNDING * p.supply_pressure
+    if not np.any(dry):
+        return
+    first = int(np.argmax(np.any(dry, axis=1)))
+    place = int(np.argmax(dry[first]))
+    where = f"chamber {place + 1}" if place < DIAPHRAGMS else f"side {'AB'[place - DIAPHRAGMS]} of the cylinder"
+    raise HydrostateError(
+        f"the {NAME} plant stopped at {begin + sample_time * first:.4f} s: {where} ran out of liquid; raise "
+        f"supply_pressure, {p.supply_pressure:g} Pa, or lower the drive or the load"
+    )
+
+
 def electrode_voltages(bent: Array, parameters: DiaphragmMotorParameters, sample_time: float) -> Array:
     """Return the electrode voltages of a run from rest: gain and charge leakage (equation 15, errata M15).
 
@@ -217,7 +265,7 @@ def run_schedule(schedule: Schedule, voltage: Array, sample_time: float) -> tupl
     DriveError
         If the times do not rise from 0.
     HydrostateError
-        If the state stops being finite.
+        If the state stops being finite, or a place runs out of liquid.
     """
     times = [time for time, _ in schedule]
     if not times or times[0] != 0.0 or any(b <= a for a, b in pairwise(times)):
@@ -230,6 +278,7 @@ def run_schedule(schedule: Schedule, voltage: Array, sample_time: float) -> tupl
     for (_, p), first, end in zip(schedule, edges[:-1], edges[1:], strict=True):
         here = slice(first, end + 1)
         states[here] = run_motor(p, voltage[here], sample_time, start=start)
+        require_liquid(states[here], p, sample_time, sample_time * first)
         bent[here] = deflections(states[here], voltage[here], p)
         start = states[end].copy()
     return states, bent
@@ -270,7 +319,7 @@ def simulate_motor(
     DriveError
         If the drive is not a finite series within -150 to 150 V.
     HydrostateError
-        If the state stops being finite, or noise is wanted without a generator.
+        If the state stops being finite, a place runs out of liquid, or noise is wanted without a generator.
 
     Examples
     --------

@@ -157,6 +157,21 @@ def test_no_chamber_falls_below_the_least_pressure() -> None:
     assert np.all((states[:, OPENINGS] > 0.0) & (states[:, OPENINGS] <= 1.0))
 
 
+def test_a_pump_that_runs_dry_has_no_flow() -> None:
+    starved = pump_alone(replace(HEALTHY, supply_pressure=2e4))
+    with pytest.raises(HydrostateError, match=r"chamber \d ran out of liquid; raise supply_pressure, 20000 Pa"):
+        operate(starved, PEAK, SWING)
+    fed = operate(replace(starved, supply_pressure=5e4), PEAK, SWING)
+    assert fed.outlet_flow == pytest.approx(fed.inlet_flow, rel=1e-4)
+
+
+def test_a_load_that_pulls_a_side_dry_is_no_log() -> None:
+    pulled = replace(HEALTHY, load_force=-100.0)
+    drive = motor_drive(PEAK, SWING, 0.05, SAMPLE_TIME)
+    with pytest.raises(HydrostateError, match=r"stopped at 0\.03\d\d s: side A of the cylinder ran out of liquid"):
+        simulate_motor([(0.0, HEALTHY), (0.03, pulled)], drive, SAMPLE_TIME)
+
+
 def test_electrodes_hold_no_steady_charge() -> None:
     held = electrode_voltages(np.full((2000, 7), 1e-6), HEALTHY, 1e-3)
     assert np.all(np.abs(held[-1]) < 1e-6)
