@@ -93,7 +93,8 @@ def _refuse_shadows() -> None:
 _refuse_shadows()
 
 from experiments.python_user.answers import Answer, Model, no_such, refuse  # noqa: E402 - after the check
-from experiments.python_user.log import Log, known_options  # noqa: E402 - likewise
+from experiments.python_user.log import Log  # noqa: E402 - likewise
+from experiments.python_user.options import known_options, refuse_entries  # noqa: E402 - likewise
 from experiments.python_user.python_words import options_by_name  # noqa: E402 - likewise
 from plant.lazy import lazy_getattr  # noqa: E402 - likewise
 
@@ -311,6 +312,7 @@ def simulate(
     simulation = verb_of_kind(kind, "simulate")
     if condition is not None:
         options["condition" if "condition" in simulation.options else "fault"] = condition
+    refuse_entries(options, simulation.options, kind.parameters)
     asked = {**simulation.options, **known_options(options, simulation.options, "simulate")}
     if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"seed must be a whole number from 0 up, got {seed!r}")

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from plant.errors import HydrostateError
+from plant.errors import HydrostateError, not_known
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +53,7 @@ def actuator(name: str, what: str = "--plant") -> "ActuatorKind":
         if name == kind.name or name in kind.models:
             return kind
     known = [one for kind in actuators() for one in (kind.name, *kind.models)]
-    raise HydrostateError(f"{what} must be one of {', '.join(known)}, got {name!r}")
+    raise HydrostateError(not_known(what, name, known))
 
 
 def kind_of_rig(rig: "Rig[Any]", usual: str) -> "ActuatorKind":

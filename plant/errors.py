@@ -157,11 +157,27 @@ def require_known(
     """
     names = list(known)
     if name not in names:
-        from difflib import get_close_matches  # imported here, because a correct name does not need it
+        raise error(not_known(what, name, names))
 
-        near = get_close_matches(str(name), names, n=1)
-        hint = f", did you mean {near[0]!r}?" if near else ""
-        raise error(f"{what} must be one of {', '.join(names)}, got {name!r}{hint}")
+
+def not_known(what: str, name: object, known: Sequence[str]) -> str:
+    """Return the error sentence for an unknown name.
+
+    Returns
+    -------
+    str
+        With all names, and the closest one.
+
+    Examples
+    --------
+    >>> not_known("plant", "piezo_stack", ["eha", "piezo-stack"])
+    "plant must be one of eha, piezo-stack, got 'piezo_stack', did you mean 'piezo-stack'?"
+    """
+    from difflib import get_close_matches  # imported here, because a correct name does not need it
+
+    near = get_close_matches(str(name), known, n=1)
+    hint = f", did you mean {near[0]!r}?" if near else ""
+    return f"{what} must be one of {', '.join(known)}, got {name!r}{hint}"
 
 
 def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from math import isfinite
+from numbers import Real
 from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
 from plant.errors import RigError
@@ -136,7 +137,8 @@ def require_numbers(parameters: Any) -> None:
     Parameters
     ----------
     parameters : dataclass instance
-        The parameters, each in its own unit; one that is None by default may be None.
+        The parameters, each in its own unit; one that is None by default may be None. A number of NumPy becomes a
+        float, so that no model computes in its precision.
 
     Raises
     ------
@@ -149,6 +151,9 @@ def require_numbers(parameters: Any) -> None:
         if value is None and one.default is None:
             continue
         if not isinstance(value, tuple | list):
+            if isinstance(value, Real) and not isinstance(value, int | float):
+                value = float(value)
+                object.__setattr__(parameters, one.name, value)
             require_number(one.name, value, signed=note.signed, zero=note.zero)
             continue
         for i, each in enumerate(value, start=1):

@@ -187,6 +187,10 @@ def finish(batch: Batch, screen: Screen, *, as_json: bool, out: Path | None, los
     raise typer.Exit(code)
 
 
+SAME_SAMPLE_TIME = 0.01
+"""Relative difference of a given sample time from the log's up to which both are one [fraction]."""
+
+
 def read_log(
     path: "Path | Table | tuple[Table, ...]",
     rig_columns: Mapping[str, str],
@@ -196,6 +200,7 @@ def read_log(
     sample_time: float | None = None,
     beside: Sequence[Path] = (),
     most_missing: float | None = None,
+    of_model: bool = False,
 ) -> "Record":
     """Read a log by the column names of a rig and of the command line, which take precedence.
 
@@ -216,6 +221,8 @@ def read_log(
         Files from other loggers in the same test.
     most_missing : float, optional
         Share of the samples that may be missing [fraction]; 5 % if not given.
+    of_model : bool
+        Whether the sample time is that of a model to fit, which may differ from the log's.
 
     Raises
     ------
@@ -225,10 +232,15 @@ def read_log(
     Warns
     -----
     LogWarning
-        If a column of the rig is not in the log.
+        If a column of the rig is not in the log, or the log's time contradicts the sample time.
     """
+    import warnings
+
+    from plant.errors import LogWarning
     from plant.log.checks import REQUIRED
+    from plant.log.columns import TIME
     from plant.log.files import read_record, source_of
+    from plant.log.notes import LogCode
     from plant.log.plausibility import require_measurable
 
     wanted = REQUIRED if required is None else required
@@ -241,6 +253,9 @@ def read_log(
         more["most_missing"] = most_missing
     record = with_rig_columns(lambda given: read_record(path, columns=given, **more), rig_columns, columns)
     require_measurable(record.channels, source_of(path))
+    if sample_time is not None and not of_model and abs(record.sample_time / sample_time - 1.0) > SAME_SAMPLE_TIME:
+        said = LogCode.TIME_KEPT.note(channel=TIME, asked_s=sample_time, sample_time_s=record.sample_time)
+        warnings.warn(LogWarning(said, source_of(path)), stacklevel=2)
     return record
 
 

@@ -71,11 +71,12 @@ def _with_fault(motor: DiaphragmMotorParameters, fault: str | None) -> Diaphragm
         return motor
     name, _, severity = fault.partition("=")
     try:
-        return motor_with_fault(motor, name, float(severity))
+        size = float(severity)
     except ValueError:
         raise HydrostateError(
             f"--fault must be a name and a severity, such as valve_4_leak=0.1, got {fault!r}"
         ) from None
+    return motor_with_fault(motor, name, size)
 
 
 def _with_load(rig: Rig[Any], options: Options) -> Rig[Any]:

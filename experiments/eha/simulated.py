@@ -65,7 +65,7 @@ def _run_plant(
     del sound
     for name in ("columns", "parameter"):
         if options[name]:
-            raise HydrostateError(f"--{name} needs --fmu FILE")
+            raise HydrostateError(f"--{name} needs --fmu FILE; parameters of the actuator stand in its rig file")
     plant = options["plant"] if options["plant"] in PLANTS else "circuit"
     sensors = NOISE[options["sensors"]]
     return plant, simulate(PLANTS[plant], speed, options["sample_time"], faulty, sensors=sensors, rng=rng)

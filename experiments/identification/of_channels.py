@@ -99,7 +99,7 @@ def identify_channels(
 
     def work(log: Path) -> Result:
         try:
-            record = read_log(log, rig.columns, columns, sample_time=fit.sample_time)
+            record = read_log(log, rig.columns, columns, sample_time=fit.sample_time, of_model=True)
         except NoChannelError as error:
             hint = "--input COLUMN --output COLUMN relates any others"
             raise NoChannelError(f"{error.message}; {hint}", error.source) from error

@@ -157,21 +157,23 @@ def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> "pd.Data
     -------
     pandas.DataFrame
         By quantity: ``unit``, ``first``, ``second``, ``difference`` (second minus first), the ends ``low`` and ``high``
-        of its 95 % interval [the row's unit], and ``changed``, whether that interval excludes zero.
+        of its 95 % interval [the row's unit], and ``changed``, whether that interval excludes zero. It is missing
+        (``pandas.NA``) without that interval, or if the numbers of a log are not reliable.
     """
     import pandas as pd
 
+    doubted = is_unreliable(first) or is_unreliable(second)
     rows = [
         {
             **{name: row[name] for name in ("quantity", "unit")},
             **{name: (row[name] or {}).get("value") for name in ("first", "second")},
             "difference": row["difference"],
             **dict(zip(("low", "high"), row["interval"] or (None, None), strict=True)),
-            "changed": row["changed"],
+            "changed": None if doubted or not row["interval"] else row["changed"],
         }
         for row in comparison_rows(first, second)
     ]
-    return pd.DataFrame(rows).set_index("quantity")
+    return pd.DataFrame(rows).set_index("quantity").astype({"changed": "boolean"})
 
 
 def quantities_of(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -171,6 +171,8 @@ class Answer(Shown):
         """
         from experiments.log_pages.comparison import differences
 
+        if not isinstance(other, Answer):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+            refuse(f"compare needs another answer, such as log.diagnose(), got {type(other).__name__}")
         return differences(self.to_dict(), other.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
@@ -197,10 +199,8 @@ class Answer(Shown):
 
         every = {**self.finding.quantities, **self.finding.severities}
         absent = (None, None)
-        rows = {
-            name: (one.value, *(one.ci95 or absent), *(one.ci95_total or absent), one.unit)
-            for name, one in every.items()
-        }
+        told = [(one.value, *(one.ci95 or absent), *(one.ci95_total or absent), one.unit) for one in every.values()]
+        rows = dict(zip(every, told, strict=True))
         ends = [f"{interval}_{end}" for interval in ("ci95", "ci95_total") for end in ("low", "high")]
         return pd.DataFrame.from_dict(rows, orient="index", columns=["value", *ends, "unit"])
 

@@ -6,7 +6,8 @@ from math import isfinite
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
-from experiments.python_user.answers import Answer, Model, Shown, names_of, no_such, refuse
+from experiments.python_user.answers import Answer, Model, Shown, names_of, refuse
+from experiments.python_user.options import known_options
 from experiments.python_user.python_words import options_by_name
 from experiments.python_user.words_of_answer import Words
 
@@ -34,31 +35,6 @@ FREE_OPTIONS = ("input", "output", "structure", "order", "delay", "n_numerator",
 
 WHOLE = ("order", "delay", "n_numerator")
 """Those options that must be whole numbers, if given."""
-
-
-def known_options(options: Mapping[str, Any], known: Mapping[str, Any], verb: str) -> Mapping[str, Any]:
-    """Return the options if the verb has each of them, and each has the type of its default.
-
-    Parameters
-    ----------
-    options, known : Mapping[str, Any]
-        The given options, and all options with their defaults.
-
-    Raises
-    ------
-    HydrostateError
-        If one is unknown, or is text instead of a number.
-    """
-    for name, value in options.items():
-        if name not in known:
-            refuse(no_such(verb, name, list(known)))
-        default = known[name]
-        counts = isinstance(default, int) and not isinstance(default, bool)
-        if (counts or isinstance(default, float)) and (isinstance(value, bool) or not isinstance(value, Real)):
-            refuse(f"{name} must be a number, got {value!r}")
-        if isinstance(default, str) and not isinstance(value, str):
-            refuse(f"{name} must be a text such as {default!r}, got {value!r}")
-    return options
 
 
 class Log(Shown):
@@ -119,6 +95,13 @@ class Log(Shown):
 
     def __len__(self) -> int:
         return len(self.record)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self.__dict__.get("record", ()):
+            from plant.errors import NoSuchNameError
+
+            raise NoSuchNameError(f"Log has no attribute {name!r}; log[{name!r}] is that channel")
+        return super().__getattr__(name)
 
     def __str__(self) -> str:
         said = f"Log of {self.plant}: {self.duration:g} s at {1.0 / self.sample_time:g} Hz"

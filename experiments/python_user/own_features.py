@@ -1,6 +1,7 @@
 """Features of logs and cycles in one call, from which a user's own classes are learnt."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,10 +69,15 @@ def features(
         names, values, step = _of_array(runs, channels, sample_time, cycle)
     else:
         names, values, step = _of_logs(runs, channels, sample_time, cycle)
-    if isinstance(bands, int):
-        recipe = Recipe(parts, octaves=bands)
+    if isinstance(parts, bool) or not isinstance(parts, Integral):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+        raise HydrostateError(f"parts must be a whole number, got {parts!r:.80}")
+    if isinstance(bands, Integral):
+        recipe = Recipe(int(parts), octaves=int(bands))
     else:
-        recipe = Recipe(parts, edges=tuple(float(one) for one in bands))
+        given: Any = bands
+        if not isinstance(given, Iterable) or not all(isinstance(one, Real) for one in given):
+            raise HydrostateError(f"bands must be a number of octaves or frequencies [Hz], got {given!r:.80}")
+        recipe = Recipe(int(parts), edges=tuple(float(one) for one in given))
     return channel_features(names, values, step, recipe)
 
 

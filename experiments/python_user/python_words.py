@@ -27,6 +27,9 @@ def options_by_name() -> Generator[None]:
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 """An option in command line form."""
 
+_VALUE = re.compile(r"(?<![\w-])--([a-z][a-z-]*) ([A-Z]+)\b")
+"""An option with the name of its value."""
+
 _COLUMNS = re.compile(r"--columns '([^']*)'")
 """Columns as suggested by an error for the command line."""
 
@@ -41,12 +44,15 @@ def in_python(said: str) -> str:
     --------
     >>> in_python("give --start-std, or `hydrostate rig init --force`; perhaps --columns 'position_m=Weg [mm]:mm'")
     "give start_std, or `hydrostate rig init --force`; perhaps columns={'position_m': 'Weg [mm]:mm'}"
+    >>> in_python("--sample-time S takes the rows as evenly spaced")
+    'sample_time=S takes the rows as evenly spaced'
     """
     parts = said.split("`")
     for place in range(0, len(parts), 2):
         text = _COLUMNS.sub(lambda found: f"columns={_mapping(found[1])}", parts[place])
         for option, argument in ELSEWHERE.items():
             text = text.replace(option, argument)
+        text = _VALUE.sub(lambda found: f"{found[1].replace('-', '_')}={found[2]}", text)
         parts[place] = _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
     return "`".join(parts)
 

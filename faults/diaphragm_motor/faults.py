@@ -211,5 +211,6 @@ def motor_with_fault(healthy: DiaphragmMotorParameters, name: str, severity: flo
     fault = MOTOR_FAULTS[name]
     least, most = fault.severities[0], fault.severities[-1]
     if not least <= severity <= most:
-        raise HydrostateError(f"severity of {name} must be {least:g} to {most:g} {fault.unit}, got {severity:g}")
+        unit = "" if fault.unit == "1" else f" {fault.unit}"
+        raise HydrostateError(f"severity of {name} must be {least:g} to {most:g}{unit}, got {severity:g}")
     return fault.inject(healthy, severity)

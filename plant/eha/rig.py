@@ -4,7 +4,7 @@ A rig may be of any kind of actuator: its parameters are a frozen dataclass whos
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -31,7 +31,6 @@ _EXAMPLES: Mapping[str, str] = {
     "motor_voltage_v": "U_MOTOR:V",
 }
 
-
 EHA = "eha"
 """Name of the gear-pump actuator in a rig file; a file without a plant is read as the kind that is required."""
 
@@ -46,7 +45,6 @@ UNEQUAL_SIDES = (*PAIRS.values(), "pilot_share")
 """Entries that two numbers for sides A and B set: a template has them as comments, so that they do not contradict."""
 
 P = TypeVar("P", default=EhaParameters)
-
 
 SIZED = f",\n# except {' and '.join(SIZED_BY_PUMP)}, which then go with the pump's flow."
 """Remark in the template on omitted entries."""
@@ -76,9 +74,9 @@ class Rig(Generic[P]):
     Raises
     ------
     RigError
-        If an uncertainty is negative or of an unknown entry, if a measured entry has no default uncertainty or has an
-        own uncertainty as well, if either is given for an entry without a value, or if a column's channel or unit is
-        unknown.
+        If name or parameters are of another type, if an uncertainty is negative or of an unknown entry, if a measured
+        entry has no default uncertainty or has an own uncertainty as well, if either is given for an entry without a
+        value, or if a column's channel or unit is unknown.
 
     Examples
     --------
@@ -94,6 +92,8 @@ class Rig(Generic[P]):
     plant: str | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not is_dataclass(self.parameters):  # pyright: ignore -- a user's slip
+            raise RigError(f"a rig is Rig(name, parameters), got {self.name!r:.40} and {self.parameters!r:.40}")
         doubted = default_uncertainties(self.parameters)
         _require_known(self.uncertainties, dict.fromkeys((*_names(type(self.parameters)), *doubted)), "uncertainty")
         _require_known(self.measured, doubted, "measured")
@@ -139,9 +139,9 @@ def read_rig(path: str | Path, parameter_class: type[Any] = EhaParameters, plant
         If the file cannot be read or is not TOML, is of another kind of actuator, or an entry is unknown, of the wrong
         type, out of range, or of a size that no actuator has in SI.
     """
-    from plant.eha.rig_entries import type_errors_as_rig_errors
+    from plant.eha.rig_entries import path_of_rig, type_errors_as_rig_errors
 
-    content = _read_content(Path(path))
+    content = _read_content(path_of_rig(path))
     try:
         with type_errors_as_rig_errors():
             found = _rig(content, parameter_class, plant)

@@ -2,12 +2,28 @@
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from plant.errors import RigError
 from plant.small_file import entry_text
+
+
+def path_of_rig(given: object) -> Path:
+    """Return the path of a rig file.
+
+    Raises
+    ------
+    RigError
+        If it is no path.
+    """
+    if not isinstance(given, str | PathLike):
+        raise RigError(f"the path of a rig file is needed, got {given!r:.80}")
+    return Path(given)  # pyright: ignore[reportUnknownArgumentType] -- of text, or refused by Path
+
 
 Strict = Annotated[float, Field(strict=True)]
 

@@ -85,8 +85,11 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     for name, one in values.items():
         if hasattr(one, "magnitude"):
             values[name], units[name] = _of_quantity(name, one)
-    if is_frame(given) and not any(map(_is_time, names)):
-        values = {**_time(given.index), **values}
+    index = given.index if is_frame(given) else _shared_index(given)
+    if index is not None and not any(map(_is_time, names)):
+        if index.nlevels > 1:
+            raise LogError(f"an index of one level is needed, got {index.nlevels}: use reset_index()", SOURCE)
+        values = {**_time(index), **values}
     lengths = {name: np.size(one) for name, one in values.items()}
     if not lengths or not max(lengths.values()):
         raise LogError("columns with at least one row are needed, got an empty table", SOURCE)
@@ -95,6 +98,29 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
         raise LogError(f"columns of one length are needed, got {got} samples", SOURCE)
     spans = {name: _seconds(one) for name, one in values.items() if np.asarray(one).dtype.kind == "m"}
     return table_of(SOURCE, {**values, **spans}, units={**units, **dict.fromkeys(spans, "s")})
+
+
+def _shared_index(given: Any) -> "pd.Index[Any] | None":
+    """Return the index of all columns if they are series of pandas; None for others.
+
+    An index that only counts rows tells nothing of them.
+
+    Raises
+    ------
+    LogError
+        If two columns of one length have different indexes: rows side by side would not belong together.
+    """
+    every = {name: one.index for name, one in given.items() if hasattr(one, "iloc") and hasattr(one, "index")}
+    told = {name: one for name, one in every.items() if not one.equals(one[:0].union(range(len(one))))}
+    for name, index in told.items():
+        first = next(iter(told))
+        if len(index) == len(told[first]) and not index.equals(told[first]):
+            raise LogError(
+                f"series of one index are needed, got other rows in {_text(name)} than in {_text(first)}: "
+                "pandas.concat(..., axis=1) brings them together, to_numpy() takes them as they stand",
+                SOURCE,
+            )
+    return next(iter(told.values())) if told and len(told) == len(given) else None
 
 
 def _is_time(name: str) -> bool:

@@ -101,6 +101,10 @@ class LogCode(Code):
         "{channel} does not increase in {count} places, the first in row {row}; all rows were taken as evenly spaced "
         "by {sample_time_s:g} s, as asked: if another test begins there, keep one side of it"
     )
+    TIME_KEPT = (
+        "{channel} says that samples are {sample_time_s:.4g} s apart: this is used, and not the {asked_s:.4g} s that "
+        "were given; if the times are wrong, name their unit, or leave them out of the log"
+    )
     CLOCK_ASSUMED = (
         "the log has no time column: a sample time of {sample_time_s:g} s was assumed; --sample-time gives another"
     )

@@ -1,10 +1,12 @@
 from collections.abc import Callable
 from dataclasses import make_dataclass
 from math import pi
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import pytest
 
+from plant.eha.model import EhaParameters
 from plant.errors import RigError
 from plant.unit_text import plain_unit
 from plant.units import LITRE_PER_MINUTE, SI, USUAL, conversion_to, notes, pint_conversion, require_number
@@ -76,3 +78,12 @@ def _converted(convert: Callable[..., tuple[float, float]], *units: str) -> obje
         return convert(*units)
     except ValueError as error:
         return str(error)
+
+
+@pytest.mark.parametrize("value", [np.float32(1.5e9), np.int64(1_500_000_000)])
+def test_a_number_of_numpy_becomes_a_float(value: Any) -> None:
+    p = EhaParameters(bulk_modulus=value)
+    assert type(p.bulk_modulus) is float
+    assert p.bulk_modulus == 1.5e9
+    with pytest.raises(RigError, match="bulk_modulus must be a finite number, got nan"):
+        EhaParameters(bulk_modulus=np.float32("nan"))  # type: ignore[arg-type]

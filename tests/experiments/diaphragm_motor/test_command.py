@@ -7,8 +7,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+import hydrostate as hs
 from experiments.cli import app
 from experiments.diaphragm_motor.figures import MOTOR_FIGURES
+from plant.errors import HydrostateError
 from plant.log.files import read_record
 
 RUN = CliRunner()
@@ -26,6 +28,19 @@ def test_a_simulated_run_is_written_with_the_channels_of_its_sensors_and_can_be_
     assert list(log) == ["time_s", "drive_voltage_v", *(f"electrode_{i}_v" for i in range(1, 8)), "position_m"]
     assert len(log) == 5001
     assert set(read_record(out, required=("drive_voltage_v", "position_m"))) == set(log) - {"time_s"}
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("valve_9_leak=0.1", "got 'valve_9_leak', did you mean 'valve_8_leak'"),
+        ("valve_4_leak", "a name and a severity, such as valve_4_leak=0.1, got"),
+        ("valve_4_leak=7", "severity of valve_4_leak must be 0 to 1, got 7"),
+    ],
+)
+def test_a_fault_that_does_not_exist_is_told_from_one_without_severity(fault: str, said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        hs.simulate(fault, plant="diaphragm-motor", duration=0.02)
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,44 @@ def test_an_option_of_the_wrong_kind_is_refused_before_any_work(log: hs.Log) -> 
         log.estimate(start_std="wide")
     with pytest.raises(hs.HydrostateError, match="did you mean 'form'"):
         log.estimate(forms="auto")
+    with pytest.raises(hs.HydrostateError, match="no_pressure must be True or False, got 'no'"):
+        log.estimate(no_pressure="no")
+    with pytest.raises(hs.HydrostateError, match=r"states must be a text, got \['leakage'\]"):
+        log.estimate(method="ekf", states=["leakage"])
+
+
+def test_a_truth_value_of_numpy_is_one(log: hs.Log) -> None:
+    assert log.estimate(no_pressure=np.bool_(False)).to_dict() == log.estimate().to_dict()
+
+
+def test_a_channel_that_is_taken_for_an_attribute_is_said_to_be_an_item(log: hs.Log) -> None:
+    with pytest.raises(AttributeError, match=r"log\['position_m'\] is that channel"):
+        log.position_m  # noqa: B018
+    assert not hasattr(log, "position_m")
+
+
+def test_a_parameter_of_the_actuator_is_no_option_and_an_fmus_are_no_actuators() -> None:
+    with pytest.raises(hs.HydrostateError, match=r"give it in a rig file, or as rig=replace\(rig, parameters="):
+        hs.simulate(bulk_modulus=1e9)
+    with pytest.raises(hs.HydrostateError, match="parameter needs fmu=FILE; parameters of the actuator stand in its"):
+        hs.simulate(parameter="bulk_modulus=1e9")
+
+
+def test_a_sample_time_that_a_logs_time_contradicts_is_told(log: hs.Log) -> None:
+    with pytest.warns(LogWarning, match=r"are 0\.001 s apart: this is used, and not the 0\.002 s that were given"):
+        assert hs.read(log.to_frame(), sample_time=2e-3).sample_time == pytest.approx(1e-3)
+    assert hs.read(log.to_frame(), sample_time=1.001e-3).sample_time == pytest.approx(1e-3)
+
+
+def test_an_answer_is_compared_with_an_answer_and_says_nothing_of_what_one_of_them_lacks(log: hs.Log) -> None:
+    verdict = log.diagnose()
+    with pytest.raises(hs.HydrostateError, match=r"compare needs another answer, such as log\.diagnose\(\), got Log"):
+        verdict.compare(log)  # type: ignore[arg-type]
+    table = verdict.compare(log.estimate())
+    assert table.loc["leakage_flow", "second"] != table.loc["leakage_flow", "second"]
+    assert table["changed"].isna().tolist() == table["low"].isna().tolist()
+    assert table["changed"].isna().any()
+    assert not table["changed"].isna().all()
 
 
 def test_between_cuts_a_log_and_refuses_a_range_that_is_not_forward(log: hs.Log) -> None:

@@ -33,7 +33,7 @@ def test_the_severities_of_every_fault_are_in_ascending_order() -> None:
 
 @pytest.mark.parametrize(
     ("name", "severity", "said"),
-    [("rust", 0.1, "must be one of"), ("load", 40.0, "-15 to 18 N, got 40"), ("valve_1_leak", -0.1, "0 to 1 1, got")],
+    [("rust", 0.1, "must be one of"), ("load", 40.0, "-15 to 18 N, got 40"), ("valve_1_leak", -0.1, "0 to 1, got")],
 )
 def test_an_unknown_fault_or_a_severity_out_of_range_is_refused(name: str, severity: float, said: str) -> None:
     with pytest.raises(HydrostateError, match=said):

@@ -122,3 +122,23 @@ def test_features_are_the_moments_of_a_run_and_the_power_of_its_spectrum() -> No
         np.mean(np.abs(lines) ** 2) / 400 + floor**2
     )  # lines are 0.25 Hz apart, the first above 25 Hz
     assert {name: row[f"p {name}"] for name in wanted} == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"parts": 1.5}, r"parts must be a whole number, got 1\.5"),
+        ({"parts": True}, "parts must be a whole number, got True"),
+        ({"bands": "octaves"}, r"bands must be a number of octaves or frequencies \[Hz\], got 'octaves'"),
+        ({"bands": 0.5}, r"bands must be a number of octaves or frequencies \[Hz\], got 0\.5"),
+    ],
+)
+def test_parts_and_bands_of_another_type_are_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(HydrostateError, match=said):
+        hs.features(np.ones((3, 2, 60)), **options)
+
+
+def test_numbers_of_numpy_are_parts_and_bands() -> None:
+    runs = np.random.default_rng(1).standard_normal((3, 2, 60))
+    one, other = hs.features(runs, parts=np.int64(3), bands=np.int64(2)), hs.features(runs, parts=3, bands=2)  # type: ignore[arg-type]
+    pd.testing.assert_frame_equal(one, other)

@@ -1,6 +1,7 @@
 import pickle
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -226,3 +227,14 @@ def test_valves_missing_from_the_file_scale_with_the_pump_and_given_ones_stay(tm
     p = rig_of(tmp_path, text).parameters
     assert p.makeup_conductance == pytest.approx(2e-9)
     assert p.relief_conductance == 3e-8
+
+
+@pytest.mark.parametrize("made", [lambda p: Rig(p), lambda p: Rig("bench", {"parameters": p})])
+def test_a_rig_without_its_name_or_with_other_parameters_is_not_the_papers(made: Any) -> None:
+    with pytest.raises(RigError, match=r"a rig is Rig\(name, parameters\), got "):
+        made(EhaParameters(piston_area=3e-3))
+
+
+def test_a_rig_file_needs_a_path() -> None:
+    with pytest.raises(RigError, match="the path of a rig file is needed, got None"):
+        read_rig(None)  # type: ignore[arg-type]

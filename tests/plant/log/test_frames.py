@@ -184,3 +184,21 @@ def test_an_index_of_periods_is_time() -> None:
 def test_a_list_of_lists_of_several_lengths_is_refused() -> None:
     with pytest.raises(LogError, match=r"column 'position_m' must be one-dimensional, got rows of several lengths"):
         frame_table({"time_s": [0.0, 1.0], "position_m": [[1.0, 2.0], [3.0]]})
+
+
+def test_series_share_their_index_which_is_the_time_and_rows_that_do_not_belong_together_are_refused() -> None:
+    whole = table(index=pd.Index(TIME, name="time_s"))
+    series: dict[str, Any] = {name: whole[name] for name in whole}
+    assert frame_table(series).headings[0].name == "time_s"
+    counted = {"time_s": pd.Series(TIME), **series}
+    np.testing.assert_array_equal(read_any(frame_table(counted))["position_m"], CHANNELS["position_m"])
+    apart = {"motor_speed_rad_s": whole["motor_speed_rad_s"][:-5], "position_m": whole["position_m"][5:]}
+    with pytest.raises(LogError, match="got other rows in position_m than in motor_speed_rad_s"):
+        frame_table(apart)
+
+
+def test_an_index_of_two_levels_is_no_time() -> None:
+    levels = pd.MultiIndex.from_arrays([["a"] * 400, TIME])
+    with pytest.raises(LogError, match=r"an index of one level is needed, got 2: use reset_index\(\)"):
+        frame_table(table(index=levels))
+    assert frame_table(table(index=levels).assign(time_s=TIME)).headings[-1].name == "time_s"
