@@ -4,6 +4,7 @@ import keyword
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf, isfinite
+from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
@@ -48,7 +49,7 @@ class Parameter:
     unit: str = "1"
 
     def __post_init__(self) -> None:
-        _require_finite("a start", self.start)
+        object.__setattr__(self, "start", _finite("a start", self.start))
         try:
             low, high = (float(end) for end in self.bounds)
         except (TypeError, ValueError):
@@ -71,9 +72,11 @@ class Parameter:
         return abs(self.start) or (0.1 * width if isfinite(width) else 1.0)
 
 
-def _require_finite(what: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+def _finite(what: str, value: object) -> float:
+    """Return a number, also one of NumPy, as a float."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
         raise HydrostateError(f"{what} must be a finite number, got {value!r}")
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +134,8 @@ class Equations:
         for name, one in self.parameters.items():
             if not isinstance(one, Parameter):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
                 raise HydrostateError(f"parameter {name!r} must be a Parameter, or a number that is known, got {one!r}")
-        for name, value in self.known.items():
-            _require_finite(f"parameter {name!r}", value)
+        known = {name: _finite(f"parameter {name!r}", value) for name, value in self.known.items()}
+        object.__setattr__(self, "known", known)
         twice = set(self.parameters) & set(self.known)
         if twice:
             raise HydrostateError(f"parameter {min(twice)!r} must be unknown or known, got both")
@@ -146,6 +149,13 @@ class Equations:
         _require_among("held", self.held, self.inputs)
         for name in ("states", "inputs", "outputs", "parameters", "known", "initial"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: dict(one) if isinstance(one, Mapping) else one for name, one in vars(self).items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, one in state.items():
+            object.__setattr__(self, name, MappingProxyType(one) if isinstance(one, dict) else one)
 
     @property
     def every_parameter(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from experiments.python_user.answers import Shown
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -168,7 +169,10 @@ def _label(name: str, unit: str) -> str:
 
 
 def record_of(log: Any) -> "Record":
-    """Return the record of a log, of a record itself, or of a table indexed by time [s].
+    """Return the record of a log, of a record itself, or of a table.
+
+    The time of a table is its index: seconds, dates, durations, or as its name says, such as ``time_ms``. If the index
+    only counts rows, it is the column that is named so.
 
     Parameters
     ----------
@@ -179,6 +183,11 @@ def record_of(log: Any) -> "Record":
     ------
     HydrostateError
         If it is none of them, or a table has no uniform clock.
+
+    Warns
+    -----
+    LogWarning
+        If a table's rows are only counted: then they are 1 s apart.
     """
     import pandas as pd
 
@@ -205,12 +214,41 @@ def _of_table(table: "pd.DataFrame") -> "Record":
 
     from plant.log.record import Record
 
+    time = _time_of(table)
+    dates = [name for name in table.columns if table[name].dtype.kind in "mM"]
     try:
-        time: np.ndarray[Any, Any] = table.index.to_numpy(dtype=np.float64)
-        columns = {str(name): table[name].to_numpy(dtype=np.float64) for name in table.columns}
+        columns = {str(name): table[name].to_numpy(dtype=np.float64) for name in table.columns if name not in dates}
     except (TypeError, ValueError) as error:
         raise HydrostateError(f"a table of numbers by time [s] is needed: {error}") from None
     steps = np.diff(time)
     if len(steps) == 0 or not steps[0] > 0.0 or np.abs(steps - steps[0]).max() > 1e-3 * steps[0]:
         raise HydrostateError("the index of a table must be the time [s] on a uniform clock")
     return Record(float(np.mean(steps)), columns, start_time=float(time[0]))
+
+
+def _time_of(table: "pd.DataFrame") -> "np.ndarray[Any, Any]":
+    """Return the times of a table's rows [s]."""
+    import warnings
+
+    import numpy as np
+
+    from plant.errors import LogWarning
+    from plant.log.any_columns import is_time_name, time_of
+    from plant.log.frames import SOURCE, frame_table
+    from plant.log.notes import LogCode
+
+    index = table.index
+    if index.dtype.kind in "iu" and not is_time_name(index.name):
+        named = [name for name in table.columns if is_time_name(name)]
+        if not named:
+            counted: np.ndarray[Any, Any] = index.to_numpy(dtype=np.float64)
+            if np.all(np.diff(counted) == 1.0):
+                note = LogCode.CLOCK_ASSUMED.note(sample_time_s=1.0)
+                warnings.warn(LogWarning(note, SOURCE), stacklevel=5)
+            return counted
+        time = time_of(frame_table(table[named[:1]].reset_index(drop=True)))
+    else:
+        time = time_of(frame_table(table[[]].assign(row=0.0)))
+    if time is None:
+        raise HydrostateError("a table of numbers by time is needed: its index holds neither times nor row numbers")
+    return time

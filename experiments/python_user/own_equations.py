@@ -96,7 +96,7 @@ class GreyBox(Shown):
         Parameters
         ----------
         *logs : Log, Record or pandas.DataFrame
-            With the inputs and outputs as channels; a table's index is the time [s].
+            With the inputs and outputs as channels; a table's time is its index, or a column that is named so.
         noise : Mapping[str, float], optional
             Standard deviation of an output's noise [its unit], if it is known.
         robust : bool

@@ -35,7 +35,8 @@ def features(
     Parameters
     ----------
     runs : sequence of Log, Record or pandas.DataFrame, one of them, or ndarray of shape (runs, channels, samples)
-        The index of a table is the time [s]. Gaps are filled by linear interpolation.
+        The time of a table is its index, or a column that is named so, which is no channel. Gaps are filled by linear
+        interpolation.
     channels : sequence of str, optional
         Channels to use, or the names of an array's channels; all by default.
     cycle : float, optional
@@ -98,13 +99,14 @@ def _of_array(
 
 def _of_logs(runs: Any, channels: Sequence[str] | None, sample_time: float | None, cycle: float | None) -> _Runs:
     from estimation.log_checks.bridging import bridged
+    from plant.log.any_columns import is_time_name
 
     if sample_time is not None:
         raise HydrostateError("sample_time is that of an array; logs have their own")
     records: list[Record] = [record_of(one) for one in (runs if isinstance(runs, list | tuple) else [runs])]
     if not records:
         raise HydrostateError("features of at least one run are needed, got none")
-    names = list(records[0] if channels is None else channels)
+    names = [one for one in records[0] if not is_time_name(one)] if channels is None else list(channels)
     step, values = records[0].sample_time, list[Any]()
     for place, record in enumerate(records):
         if abs(record.sample_time - step) > SAME_CLOCK * step:

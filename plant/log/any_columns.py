@@ -134,6 +134,30 @@ def time_alone(columns: Mapping[str, str] | None) -> str | None:
     return columns[TIME] if columns is not None and set(columns) == {TIME} else None
 
 
+def time_of(table: Table) -> Array | None:
+    """Return the times of an open log [s], by its column of time; None if it has none.
+
+    Examples
+    --------
+    >>> from plant.log.frames import frame_table
+    >>> time_of(frame_table({"time_ms": [0.0, 20.0], "level": [1.0, 1.1]})).tolist()
+    [0.0, 0.02]
+    """
+    column = _time_column(headings_of(table.headings))
+    return None if column is None else _seconds(table.numbers(column)[column.position], column)
+
+
+def is_time_name(name: object) -> bool:
+    """Return whether a column or an index is named as a time.
+
+    Examples
+    --------
+    >>> is_time_name("time_ms"), is_time_name("level"), is_time_name(None)
+    (True, False, False)
+    """
+    return _time_column(headings_of([str(name)])) is not None
+
+
 def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
     """Return the table that holds most of the wanted columns, or the most columns."""
 

@@ -106,7 +106,8 @@ class LogCode(Code):
         "were given; if the times are wrong, name their unit, or leave them out of the log"
     )
     CLOCK_ASSUMED = (
-        "the log has no time column: a sample time of {sample_time_s:g} s was assumed; --sample-time gives another"
+        "the log has no time column: a sample time of {sample_time_s:g} s was assumed; a column time_s or "
+        "--sample-time gives another"
     )
     TIME_UNNAMED = (
         "column {column!r} rises by about {step:g} from row to row, as a time does: if it is the time, name it and its "

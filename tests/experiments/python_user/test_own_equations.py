@@ -3,6 +3,9 @@
 # ruff: noqa: ARG005 - every slip is given the same log
 
 import json
+import pickle
+import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ import pandas as pd
 import pytest
 
 import hydrostate as hs
+from plant.errors import LogWarning
 
 TIME = 0.05 * np.arange(400)
 
@@ -95,3 +99,61 @@ def test_a_simulation_follows_a_record_or_a_table(found: Any, log: pd.DataFrame)
 def test_wrong_arguments_are_refused_with_a_precise_message(log: pd.DataFrame, slip: Any, said: str) -> None:
     with pytest.raises(hs.HydrostateError, match=said):
         slip(log)
+
+
+@pytest.mark.parametrize(
+    "timed",
+    [
+        lambda table: table.reset_index(drop=True).assign(time_s=TIME),
+        lambda table: table.reset_index(drop=True).assign(time_ms=1e3 * TIME),
+        lambda table: table.reset_index(drop=True).assign(time=pd.Timestamp("2026-01-01") + pd.to_timedelta(TIME, "s")),
+        lambda table: table.set_axis(pd.Index((1e3 * TIME).round().astype(int), name="time_ms")),
+        lambda table: table.set_axis(pd.date_range("2026-01-01", periods=len(TIME), freq="50ms")),
+        lambda table: table.set_axis(pd.date_range("2026-01-01", periods=len(TIME), freq="50ms", tz="Europe/Berlin")),
+        lambda table: table.set_axis(pd.to_timedelta(TIME, "s")),
+    ],
+)
+def test_the_time_of_a_table_is_that_of_the_same_table_as_a_log(
+    timed: Callable[[pd.DataFrame], pd.DataFrame], log: pd.DataFrame, found: Any
+) -> None:
+    table = timed(log)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = oven().fit(table)
+    assert again.values["rate"] == pytest.approx(found.values["rate"], rel=1e-9)
+    assert again.simulate(table).index.equals(table.index)
+    features = hs.features([table], parts=1, bands=2)
+    assert list(features) == list(hs.features([log], parts=1, bands=2))
+
+
+def test_rows_that_are_only_counted_are_a_second_apart_and_a_warning_says_so(log: pd.DataFrame, found: Any) -> None:
+    with pytest.warns(LogWarning, match="no time column: a sample time of 1 s was assumed"):
+        slow = oven(parameters={"rate": hs.Parameter(1.0, (1e-3, 10.0)), "heat": hs.Parameter(1.5, (1e-3, 10.0))}).fit(
+            log.reset_index(drop=True)
+        )
+    assert slow.values["rate"] == pytest.approx(0.05 * found.values["rate"], rel=0.05)
+    with pytest.raises(hs.HydrostateError, match="its index holds neither times nor row numbers"):
+        oven().fit(log.set_axis([f"row {k}" for k in range(len(log))]))
+
+
+def test_an_input_may_be_called_t() -> None:
+    table = pd.DataFrame({"t": TIME}, index=TIME)
+    drifting = hs.GreyBox(
+        lambda state, inputs, p: p.rate * inputs.t,
+        states=["x"],
+        inputs=["t"],
+        outputs=["x"],
+        parameters={"rate": hs.Parameter(2.0)},
+    )
+    assert drifting.simulate(table)["x"].iloc[-1] == pytest.approx(TIME[-1] ** 2)
+
+
+def test_equations_and_their_fit_can_be_passed_to_other_processes(log: pd.DataFrame, found: Any) -> None:
+    model, fit = pickle.loads(pickle.dumps((oven(), found)))  # noqa: S301 - our own
+    assert model.fit(log).to_dict() == found.to_dict() == fit.to_dict()
+    pd.testing.assert_frame_equal(fit.simulate(log), found.simulate(log))
+
+
+def test_numbers_of_numpy_are_starts_and_known_values() -> None:
+    assert type(hs.Parameter(np.float32(0.5)).start) is float  # type: ignore[arg-type]
+    assert oven(parameters={"rate": hs.Parameter(1.0), "heat": np.int64(2)}).equations.known == {"heat": 2.0}
