@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -227,6 +227,9 @@ class Log(Shown):
         free: dict[str, Any] = dict.fromkeys(FREE_OPTIONS)
         if self.plant == ANY or logs or (options.keys() & {"input", "output"} and options.keys() <= free.keys()):
             known_options(options, free, "identify")
+            clock = options.get("sample_time")
+            if clock is not None and not (isinstance(clock, Real) and 0.0 < float(clock) < inf):
+                refuse(f"sample_time must be a number of seconds above 0, got {clock!r:.80}")
             for name in WHOLE:
                 if not isinstance(options.get(name), Integral | None) or isinstance(options.get(name), bool):
                     refuse(f"{name} must be a whole number, got {options[name]!r}")

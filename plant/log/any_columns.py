@@ -135,7 +135,12 @@ def time_alone(columns: Mapping[str, str] | None) -> str | None:
 
 
 def time_of(table: Table) -> Array | None:
-    """Return the times of an open log [s], by its column of time; None if it has none.
+    """Return the times of an open log, by its column of time.
+
+    Returns
+    -------
+    ndarray of shape (n,), or None
+        Times [s]; dates count from the first one. None if no column is named so.
 
     Examples
     --------

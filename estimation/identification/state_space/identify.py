@@ -13,6 +13,7 @@ from estimation.identification.free_run.data import Channels, liveliest_sections
 from estimation.identification.free_run.doubtful_channels import doubtful_channels
 from estimation.identification.free_run.held_back import pooled_error
 from estimation.identification.free_run.identify import (
+    FREE_STRUCTURES,
     HIGHEST_ORDER,
     MOST_CHOSEN,
     MOST_FITTED,
@@ -26,7 +27,7 @@ from estimation.identification.state_space.choose import StateCandidate, chosen_
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from estimation.identification.state_space.fit import fit_state_space, system_of
 from estimation.identification.state_space.joint import joined_outputs
-from plant.errors import HydrostateError, LogWarning
+from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
 STATE_SPACE = "state-space"
@@ -67,6 +68,7 @@ def identify_outputs(
     LogWarning
         As `identify_channels`.
     """
+    require_known("structure", structure, (*FREE_STRUCTURES, STATE_SPACE))
     form: dict[str, Any] = {"order": order, "delay": delay}
     if structure == STATE_SPACE:
         if n_numerator is not None:

@@ -14,6 +14,7 @@ from estimation.identification.free_run.saved import load_models
 from estimation.identification.model.recursion import filtered
 from experiments.python_user.log import ANY, Log
 from experiments.python_user.relation import Relation, identified
+from hydrostate import read
 from plant.eha.rig import Rig
 from plant.errors import HydrostateError, LogWarning, NoSuchNameError
 from plant.log.record import Record
@@ -247,3 +248,12 @@ def test_repeated_rows_are_left_out_of_identification_with_a_warning() -> None:
     with pytest.warns(LogWarning, match="20 rows a second time"):
         found = identified([sent], "valve", "heat", options)
     assert found.models[0].to_dict() == identified([once], "valve", "heat", options).models[0].to_dict()
+
+
+def test_a_slip_in_structure_or_sample_time_is_called_by_its_name() -> None:
+    noise = np.random.default_rng(1).standard_normal((2, 200))
+    log = read({"time_s": 0.1 * np.arange(200), "u": noise[0], "y": noise[1]})
+    with pytest.raises(HydrostateError, match=r"structure must be one of .*, state-space, got 'state space', did you"):
+        log.identify(input="u", output="y", structure="state space")
+    with pytest.raises(HydrostateError, match="sample_time must be a number of seconds above 0, got 0"):
+        log.identify(input="u", output="y", sample_time=0)
