@@ -250,10 +250,12 @@ def _continuous(
     input_name: str,
     output_name: str,
     covariance: CovarianceKind,
+    estimate_offset: bool = False,
     **_: Any,
 ) -> LinearModel:
     """Fit a strictly proper model. With a held input, its output responds one sample late even without dead time."""
     about: dict[str, Any] = {"input_name": input_name, "output_name": output_name, "covariance": covariance}
+    about["estimate_offset"] = estimate_offset
     late, n = max(delay - 1, 0) * sample_time, n_denominator
     return fit_continuous(u, y, sample_time, n_zeros=n - 1, n_poles=n, dead_time=late, **about)
 

@@ -154,6 +154,12 @@ class IdentificationCode(Code):
         "filtered or held sensor noise). Poles and gain may be those of an approximation; --structure auto tries "
         "nonlinear models"
     )
+    NOISE_ASSUMED = (
+        "{structure} and output-error give models of {output!r} that differ by more than their uncertainty (p = "
+        "{p_value:.1g}): poles and gain of one of them are biased. In open loop it is {structure}, as what it assumes "
+        "of the noise does not hold: use output-error. In a closed loop it is output-error. If the order is too low, "
+        "it is both"
+    )
     MODEL_TOO_SMALL = (
         "the model leaves {left:.0%} of the deviation of {output!r}, and a linear filter of the inputs explains "
         "{explained:.0%} of the variance of that: the model is too small, and its poles and gain are less certain than "
@@ -195,6 +201,7 @@ RAISED_AS_WARNINGS = (
     IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.OUTPUT_AT_END,
     IdentificationCode.FEEDBACK,
+    IdentificationCode.NOISE_ASSUMED,
     IdentificationCode.SWAPPED,
     IdentificationCode.INPUT_LOGGED_LATE,
     IdentificationCode.INPUTS_ALIKE,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.fit.fitted import CovarianceKind, Task
+from estimation.identification.fit.fitted import CovarianceKind, Task, without_offset
 from estimation.identification.model.lags import lagged
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.model.recursion import filtered
@@ -23,6 +23,7 @@ def fit_arx(
     n_denominator: int,
     delay: int = 0,
     covariance: CovarianceKind = "white",
+    estimate_offset: bool = False,
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
@@ -40,6 +41,9 @@ def fit_arx(
         Dead time [samples].
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`.
+    estimate_offset : bool
+        Whether a constant output, `LinearModel.offset`, is fitted along: in a short record, the mean is not the output
+        at the mean input. Remove means first all the same, since starts are without it.
 
     Returns
     -------
@@ -59,14 +63,19 @@ def fit_arx(
     [1.0, -0.7]
     """
     form = Structure(n_numerator, n_denominator, delay)
-    task = Task(form, sample_time, covariance, (input_name, output_name))
+    task = Task(form, sample_time, covariance, (input_name, output_name), estimate_offset=estimate_offset)
     data = task.experiments(u, y)
     rows, target, kept = [], [], np.zeros(data.u.size, dtype=bool)
     begin = max(n_denominator, delay + n_numerator - 1)
     for part in data.slices:
         measured = data.measured()[part]
         columns = np.concatenate(
-            [lagged(data.u[part], delay, n_numerator), -lagged(measured, 1, n_denominator)], axis=1
+            [
+                lagged(data.u[part], delay, n_numerator),
+                -lagged(measured, 1, n_denominator),
+                np.ones((measured.size, int(estimate_offset))),
+            ],
+            axis=1,
         )
         whole = np.isfinite(columns).all(axis=1) & np.isfinite(measured)
         whole[:begin] = False
@@ -76,10 +85,13 @@ def fit_arx(
     regressors, wanted = np.concatenate(rows), np.concatenate(target)
     values = np.linalg.lstsq(regressors, wanted, rcond=None)[0]
     residual = wanted - regressors @ values
-    b, f = values[:n_numerator], values[n_numerator:]
-    theta = np.concatenate([values, _initial_state(form, b, f, data)])
+    b, f = values[:n_numerator], values[n_numerator : form.n_main]
+    # the constant stands outside the loop that F closes; a pole at 1 has none
+    rest = 1.0 + float(f.sum())
+    offset = float(values[-1]) / rest if estimate_offset and rest != 0.0 else 0.0
+    theta = np.concatenate([b, f, _initial_state(form, b, f, without_offset(data, offset))])
     noise = (np.ones(1), np.concatenate([[1.0], f]))
-    return task.model(theta, regressors, residual, replace(data, used=kept), "ARX", noise)
+    return task.model(theta, regressors, residual, replace(data, used=kept), "ARX", noise, offset)
 
 
 def _initial_state(form: Structure, b: Array, f: Array, data: Experiments) -> Array:

@@ -43,6 +43,7 @@ def fit_continuous(
     n_poles: int,
     dead_time: float | None = 0.0,
     covariance: CovarianceKind = "white",
+    estimate_offset: bool = False,
     input_name: str = "input",
     output_name: str = "output",
 ) -> LinearModel:
@@ -60,6 +61,9 @@ def fit_continuous(
         Known delay of the input [s]; None estimates it, ten samples at most.
     covariance : {"white", "coloured", "auto"}
         As `fit_output_error`; the deviation of the dead time is from the same one.
+    estimate_offset : bool
+        Whether a constant output, `LinearModel.offset`, is fitted along: in a short record, the mean is not the output
+        at the mean input. Remove means first all the same, since starts are without it.
 
     Returns
     -------
@@ -76,7 +80,7 @@ def fit_continuous(
     n_wanted = SAMPLES_PER_PARAMETER * (n_zeros + 2 * n_poles + 2)
     names = (input_name, output_name)
     given = experiments_from(u, y, names, n_excited=2 * n_poles, n_wanted=n_wanted)
-    problem = _Problem(given.scaled(), sample_time, n_zeros, n_poles, dead_time)
+    problem = _Problem(given.scaled(), sample_time, n_zeros, n_poles, dead_time, estimate_offset=estimate_offset)
     early = problem.without_whole_samples()
     found = [early.descend(start) for start in early.starts()]
     values = min(found, key=lambda one: one[0])[1]
@@ -86,7 +90,7 @@ def fit_continuous(
 class _ModelAtPoint(NamedTuple):
     """A model at one point: discrete numerator, denominator and delay, and derivatives by them and by initial states.
 
-    The residual uses the best initial states.
+    A fitted offset is one more initial state. The residual uses the best ones.
     """
 
     values: Array
@@ -102,8 +106,16 @@ class _Problem:
     """One continuous-time fit in scaled time. Values are numerator, denominator after its 1, and dead time if free."""
 
     def __init__(
-        self, data: Experiments, sample_time: float, n_zeros: int, n_poles: int, dead_time: float | None
+        self,
+        data: Experiments,
+        sample_time: float,
+        n_zeros: int,
+        n_poles: int,
+        dead_time: float | None,
+        *,
+        estimate_offset: bool = False,
     ) -> None:
+        self.estimate_offset = estimate_offset
         self.data, self.sample_time = data, sample_time
         self.n_zeros, self.n_poles, self.dead_time = n_zeros, n_poles, dead_time
         self._last: _ModelAtPoint | None = None
@@ -120,7 +132,8 @@ class _Problem:
         if whole == 0 or not self.data.has_outputs_after(least):
             return self
         rest = max(self.dead_time - whole * self.sample_time, 0.0)
-        return _Problem(self.data.advanced(whole), self.sample_time, self.n_zeros, self.n_poles, rest)
+        late, sizes = self.data.advanced(whole), (self.n_zeros, self.n_poles)
+        return _Problem(late, self.sample_time, *sizes, rest, estimate_offset=self.estimate_offset)
 
     def discrete(self, values: Array) -> tuple[Array, Array, int]:
         """Return numerator, denominator and delay, with one sample for each unit of time."""
@@ -141,6 +154,8 @@ class _Problem:
         jacobian, residual = jacobian_and_residual(form, theta, self.data)
         n_main = form.n_numerator + form.n_denominator
         initial = jacobian[:, n_main:]
+        if self.estimate_offset:
+            initial = np.column_stack([initial, self.data.used])
         residual = residual - initial @ np.linalg.lstsq(initial, residual, rcond=None)[0]
         self._last = _ModelAtPoint(values.copy(), b, f, delay, jacobian[:, :n_main], initial, residual)
         return self._last
@@ -161,6 +176,14 @@ class _Problem:
             moved[: b.size - delay, k] = (known - b)[delay:] / step
             moved[b.size - delay :, k] = (other_f[1:] - f[1:]) / step
         return np.concatenate([at.main @ moved, at.initial], axis=1), at.residual
+
+    def _offset(self, values: Array) -> float:
+        """Return the best offset beside the best initial states."""
+        at = self._at(values)
+        b, f = at.b[at.delay :], at.f[1:]
+        still = np.concatenate([b, f, np.zeros(at.initial.shape[1] - int(self.estimate_offset))])
+        residual = jacobian_and_residual(Structure(b.size, self.n_poles, at.delay), still, self.data)[1]
+        return float(np.linalg.lstsq(at.initial, residual, rcond=None)[0][-1])
 
     def descend(self, start: Array) -> tuple[float, Array]:
         """Return cost and values of the minimum that a descent from one start reaches."""
@@ -232,6 +255,7 @@ class _Problem:
             one[:n_main, :n_main] * np.outer(unscale, unscale) for one in (taken, white, robust)
         )
         late = self.dead_time if self.dead_time is not None else float(values[-1]) * T
+        offset = self._offset(values) * self.data.y_scale if self.estimate_offset else 0.0
         return LinearModel(
             numerator=values[:n_b] * unscale[:n_b],
             denominator=np.concatenate([[1.0], values[n_b:n_main] * unscale[n_b:]]),
@@ -246,5 +270,6 @@ class _Problem:
             structure="continuous-output-error",
             continuous=True,
             dead_time=late,
+            offset=offset,
             dead_time_std=float(np.sqrt(taken[n_main, n_main])) * T if self.dead_time is None else float("nan"),
         )

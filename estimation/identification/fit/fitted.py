@@ -43,6 +43,8 @@ class Task:
         Which one the standard deviations use.
     n_c, n_d : int
         Coefficients of the noise model behind their 1.
+    estimate_offset : bool
+        Whether a constant is added to the output, and fitted along.
     """
 
     form: Structure
@@ -51,6 +53,7 @@ class Task:
     names: tuple[str, str]
     n_c: int = 0
     n_d: int = 0
+    estimate_offset: bool = False
 
     def experiments(self, u: Signals, y: Signals) -> Experiments:
         """Return checked experiments of order one, long and lively enough for the orders.
@@ -83,6 +86,7 @@ class Task:
         data: Experiments,
         structure: str,
         noise: tuple[Array, Array] | None = None,
+        offset: float = 0.0,
     ) -> LinearModel:
         """Return the result of a fit to scaled data, in the data's units.
 
@@ -96,6 +100,8 @@ class Task:
             Prediction error; 0 where the output is missing.
         noise : tuple of ndarray, shapes (n_c + 1,) and (n_d + 1,), optional
             C and D, monic.
+        offset : float
+            Fitted constant of the scaled output.
 
         Raises
         ------
@@ -118,7 +124,7 @@ class Task:
         if noise is None:
             _require_effect(float(residual @ residual), float(data.y @ data.y), data.n_used, n_main, self.names)
         else:
-            fit, error = _simulated_fit(b, f, state, data)
+            fit, error = _simulated_fit(b, f, state, without_offset(data, offset))
             found |= {"noise_numerator": noise[0], "noise_denominator": noise[1], "fit_percent": fit}
             found |= {"rmse": error * data.y_scale, "one_step_rmse": found["rmse"]}
         whole = replace(data, u=data.u * data.u_scale, y=data.y * data.y_scale)
@@ -135,10 +141,22 @@ class Task:
             covariance_white=white,
             covariance_robust=robust,
             structure=structure,
+            offset=offset * data.y_scale,
             **found,
         )
         _warn(model, determined)
         return model
+
+
+def without_offset(data: Experiments, offset: float) -> Experiments:
+    """Return data whose output has a constant less; a missing sample stays 0.
+
+    Parameters
+    ----------
+    offset : float
+        The constant, in the data's scale.
+    """
+    return replace(data, y=np.where(data.used, data.y - offset, 0.0)) if offset else data
 
 
 def is_robust(covariance: CovarianceKind, residual: Array, data: Experiments) -> bool:

@@ -7,11 +7,16 @@ from numpy.typing import ArrayLike
 
 from estimation.arrays import Array
 from estimation.identification.model.lags import lagged
+from estimation.identification.model.linear_model import LinearModel
 from estimation.trust.chi_square import chi_square_tail
 from plant.errors import HydrostateError
 
 DEFAULT_LAGS = 25
 """Lags that the residual tests look at."""
+
+
+SINGULAR = 1e-10
+"""Share of the largest variance below which a direction of two models' difference is only rounding."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +186,34 @@ def feedback_test(residual: ArrayLike, u: ArrayLike, *, n_lags: int = DEFAULT_LA
     white[:n_lags] = np.nan
     before = np.concatenate([np.ones((inputs.size, 1)), lagged(inputs, 0, n_lags + 1)], axis=1)
     return cross_correlation_test(white[::-1], inputs[::-1], n_lags=n_lags, jacobian=before[::-1])
+
+
+def contrast_test(model: LinearModel, robust: LinearModel) -> ResidualTest:
+    """Test whether two fits of one form to the same data differ by more than their uncertainty (Hausman 1978).
+
+    Both covariances are added, as if the fits were independent. Fits to the same data differ less, so the test seldom
+    accuses.
+
+    Parameters
+    ----------
+    model : LinearModel
+        A fit that assumes something of the noise.
+    robust : LinearModel
+        One that does not, with the same numbers of coefficients; its robust covariance counts.
+
+    Returns
+    -------
+    ResidualTest
+        A small p-value says that one of both is biased.
+    """
+    values = [np.concatenate([one.free_numerator, one.denominator[1:]]) for one in (model, robust)]
+    spread = model.covariance + robust.covariance_robust
+    scale = np.sqrt(np.diag(spread))
+    apart = (values[0] - values[1]) / scale
+    strength, directions = np.linalg.eigh(spread / np.outer(scale, scale))
+    kept = strength > SINGULAR * strength[-1]
+    moved = (directions.T @ apart)[kept]
+    return _chi_square(float(np.sum(moved**2 / strength[kept])), int(np.count_nonzero(kept)))
 
 
 def correlations(residual: ArrayLike, other: ArrayLike, lags: ArrayLike) -> Array:

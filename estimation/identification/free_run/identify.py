@@ -52,7 +52,7 @@ from estimation.identification.free_run.nonlinear_outputs import (
     identified_limited,
     identified_with_quality,
 )
-from estimation.identification.free_run.other_structures import OTHER_STRUCTURES, fit_other_structure
+from estimation.identification.free_run.other_structures import OTHER_STRUCTURES, identified_other_structure
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.random_walk import identified_walk, walk_followed_notes, walk_model
 from estimation.identification.free_run.trend import detrended
@@ -162,7 +162,7 @@ def _identified(
     if given and (apart := _identified_at_other_levels(task, linear)) is not None:
         return _clearly_better_nonlinear(apart[0], linear, structure, apart[1])
     if structure in OTHER_STRUCTURES:
-        return _identified_other_structure(structure, linear)
+        return identified_other_structure(structure, linear)
     if structure == "auto" and linear.best.held_back < ROUNDING_ERROR:
         structure = "output-error"
     wanted = structure == "wiener"
@@ -313,18 +313,6 @@ def _hammerstein(taken: HammersteinCandidate, linear: LinearComparison, fallback
     dynamics = replace(HammersteinDynamics.of(fit, deviations(fit, part)), fallback=fallback)
     model = FreeRunModel(data.inputs, data.output, data.sample_time, "hammerstein", by, dynamics)
     return identified_with_quality(model, linear, taken.held_back)
-
-
-def _identified_other_structure(structure: str, compared: LinearComparison) -> Identified:
-    """Return a structure that is not fitted by its free run, at the order of the best output-error model."""
-    data, by = compared.task.data, compared.task.by
-    said = [] if compared.related else compared.notes
-    dynamics, linear, held_back = fit_other_structure(structure, compared.best.form, data, by)
-    model = FreeRunModel(data.inputs, data.output, data.sample_time, structure, by, dynamics, linear)
-    quality = model.quality(data.u, data.y)
-    sound = quality.fit_percent > 0.0 and held_back < 1.0
-    notes = said if sound else [*said, IdentificationCode.NO_FIT.note(output=data.output, fit=quality.fit_percent)]
-    return Identified(model, quality, 100.0 * (1.0 - held_back), tuple(compared.rows), tuple(notes), sound and not said)
 
 
 def _refitted(found: PolynomialCandidate, whole: Channels) -> PolynomialDynamics:

@@ -13,6 +13,7 @@ import scipy.optimize
 
 from estimation.identification.design import dead_time
 from estimation.identification.fit import continuous, instrumental, output_error, prediction_error, profile_interval
+from estimation.identification.fit.fitted import Task
 from estimation.identification.free_run import (
     choose_hammerstein,
     dead_times,
@@ -121,12 +122,13 @@ def other_fits() -> dict[str, Any]:
         prediction_error.fit_armax(U, answer(), 0.1, n_numerator=2, n_denominator=2, n_c=1, delay=1)
     told["one step ahead"] = asked
     data = experiments_from(U, answer(), ("u", "y"), n_excited=4, n_wanted=20).scaled()
+    task = Task(FORM, 0.1, "white", ("u", "y"))
     with watched(instrumental, "_pass", lambda *_: 0) as asked:
-        instrumental._refined(FORM, np.array([1.0, -0.5, 0.1]), data, 0, 0)
+        instrumental._refined(task, np.array([1.0, -0.5, 0.1]), data)
     told["passes"] = len(asked)
     swinging = iter(np.tile([0.1, 0.2], 99))
-    with watched(instrumental, "_pass", lambda *_: 0, lambda *_: np.full(4, next(swinging))) as asked:
-        instrumental._refined(FORM, np.array([1.0, -0.5, 0.1]), data, 0, 0)
+    with watched(instrumental, "_pass", lambda *_: 0, lambda *_: np.full(FORM.n_parameters, next(swinging))) as asked:
+        instrumental._refined(task, np.array([1.0, -0.5, 0.1]), data)
     told["passes at most"] = len(asked)
     problem = continuous._Problem(data, 0.1, 0, 2, 0.0)
 

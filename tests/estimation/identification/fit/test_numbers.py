@@ -1,6 +1,7 @@
 """Fits of every structure to small records, kept in `numbers.json`."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -239,17 +240,20 @@ def parts_of_prediction_errors() -> dict[str, Any]:
 def passes_of_instruments() -> dict[str, Any]:
     u, y = records()["first longer"]
     data = experiments_from(u, y, ("u", "y"), n_excited=4, n_wanted=20).scaled()
-    form = Structure(2, 2, 1)
-    values = np.array([0.2, 0.1, -1.3, 0.6])
-    one = np.ones(1)
+    task = Task(Structure(2, 2, 1), 1.0, "white", ("u", "y"))
+    values = np.array([0.2, 0.1, -1.3, 0.6, 0.3, -0.1, 0.2, 0.1])
+    one, with_offset = np.ones(1), replace(task, estimate_offset=True)
     told: dict[str, Any] = {
-        "a pass": instrumental._pass(form, values, data, one, one),
-        "a weighted pass": instrumental._pass(form, values, data, np.array([1.0, 0.4]), np.array([1.0, -0.5])),
-        "initial states": instrumental._with_initial(form, np.array([1.0, -1.3, 0.6]), data),
+        "a pass": instrumental._pass(task, values, data, one, one),
+        "a weighted pass": instrumental._pass(task, values, data, np.array([1.0, 0.4]), np.array([1.0, -0.5])),
+        "a pass with an offset": instrumental._pass(with_offset, np.append(values, 0.1), data, one, one),
+        "initial states": instrumental._with_denominator(task, np.array([1.0, -1.3, 0.6]), data),
+        "initial states and offset": instrumental._with_denominator(with_offset, np.array([1.0, -1.3, 0.6]), data),
     }
-    for n_c, n_d in ((0, 0), (1, 1)):
-        theta, noise, jacobian, residual = instrumental._refined(form, np.array([1.0, -1.0, 0.3]), data, n_c, n_d)
-        told[f"refined, {n_c}"] = [
+    for n_c, n_d, offset in ((0, 0, False), (1, 1, False), (0, 0, True)):
+        one_task = replace(task, n_c=n_c, n_d=n_d, estimate_offset=offset)
+        theta, noise, jacobian, residual = instrumental._refined(one_task, np.array([1.0, -1.0, 0.3]), data)
+        told[f"refined, {n_c}" + ", with an offset" * offset] = [
             [Found(float(one), 1e-3) for one in theta],
             [Found(float(one), 1e-3) for one in np.concatenate(noise)],
             Found(float(residual @ residual), 1e-2),

@@ -16,6 +16,7 @@ from estimation.identification import (
     fit_box_jenkins,
     fit_continuous,
     fit_instrumental,
+    fit_output_error,
     fit_subspace,
 )
 from estimation.identification.fit import continuous, output_error
@@ -115,6 +116,40 @@ def test_refined_instrumental_variables_find_the_plant_and_a_noise_model(plant_3
     assert fitted.structure == "RIV"
     assert (deviations(fitted, plant_30hz) < 3.0).all()
     assert fitted.noise_denominator[1] == pytest.approx(-0.9, abs=0.03)
+
+
+@pytest.mark.parametrize("count", [1, 6])
+def test_instrumental_variables_end_at_the_output_error_of_short_records(count: int) -> None:
+    """The numerator is fitted to all records, and none begins at rest or has its mean at the mean input."""
+    rng = np.random.default_rng(3)
+    f, inputs, outputs = [1.0, -1.7, 0.76], list[np.ndarray](), list[np.ndarray]()
+    for _ in range(count):
+        u = np.repeat(rng.uniform(-1.0, 1.0, 10), [200, *[30] * 9])
+        y = np.asarray(lfilter([0.0, 0.04, 0.02], f, u)) + 0.7 + 0.05 * rng.standard_normal(u.size)
+        inputs.append(u[200:])
+        outputs.append(y[200:])
+    about = {"n_numerator": 2, "n_denominator": 2, "delay": 1}
+    fitted = fit_instrumental(inputs, outputs, 0.01, **about, estimate_offset=True)
+    level = [y - fitted.offset for y in outputs]
+    wanted = fit_output_error(inputs, level, 0.01, **about)
+    for one, other in ((fitted.denominator, wanted.denominator), (fitted.free_numerator, wanted.free_numerator)):
+        assert one == pytest.approx(other, abs=2e-5)
+    assert fitted.offset == pytest.approx(0.7, abs=0.02)
+
+
+@pytest.mark.parametrize("fit", ["ARX", "continuous"])
+def test_an_offset_is_fitted_along(fit: str) -> None:
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(0.0, 1.0, 5), [600, *[60] * 4])
+    y = np.asarray(lfilter([0.0, 0.02], [1.0, -0.98], u))[600:]
+    u, y, level = u[600:] - u[600:].mean(), y - y.mean(), y.mean() - u[600:].mean()
+    assert abs(level) > 0.01
+    if fit == "ARX":
+        model = fit_arx(u, y, 0.1, n_numerator=1, n_denominator=1, delay=1, estimate_offset=True)
+    else:
+        model = fit_continuous(u, y, 0.1, n_zeros=0, n_poles=1, estimate_offset=True)
+    assert model.dc_gain == pytest.approx(1.0, rel=1e-6)
+    assert model.offset == pytest.approx(-level, abs=1e-6)
 
 
 def test_a_subspace_fit_chooses_its_order_by_the_noise_floor(table6: dict[str, LinearModel]) -> None:
