@@ -101,7 +101,7 @@ class Task:
         noise : tuple of ndarray, shapes (n_c + 1,) and (n_d + 1,), optional
             C and D, monic.
         offset : float
-            Fitted constant of the scaled output.
+            Fitted constant of the scaled output [dimensionless].
 
         Raises
         ------
@@ -154,7 +154,7 @@ def without_offset(data: Experiments, offset: float) -> Experiments:
     Parameters
     ----------
     offset : float
-        The constant, in the data's scale.
+        The constant, in the data's scale [dimensionless].
     """
     return replace(data, y=np.where(data.used, data.y - offset, 0.0)) if offset else data
 

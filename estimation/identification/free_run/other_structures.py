@@ -35,8 +35,8 @@ WITH_OFFSET = ("arx", "instrumental", "continuous")
 (as of a differenced series), and intervals of a short record become too narrow."""
 
 CONTRAST_PROBABILITY = 1e-3
-"""Probability below which a structure and output error are held to differ; behind noise as assumed, it was 0.1 at least
-in 70 simulated logs, since the test adds both covariances."""
+"""Probability below which a structure and output error are held to differ; behind noise as assumed, none
+of 150 fits of ARX came below, as the test adds both covariances."""
 
 HELD_BACK = 1.0 / 3.0
 """Last share of every log that is held back to judge the structure."""
