@@ -166,6 +166,10 @@ class IdentificationCode(Code):
         "their intervals say. Give a higher --order. A sweep drives each frequency only once: a drive that has all "
         "frequencies throughout shows better which order is needed"
     )
+    HIGHEST_ORDER_TAKEN = (
+        "order {order}, the highest that was compared, leaves {less:.0%} less of {output!r} on blocks held back than "
+        "lower ones: a higher order may leave less still, so try --order {more}"
+    )
     ANSWERS_LATE = (
         "{output!r} seems to answer {input!r} after {dead_time_s:.4g} s, more than a fifth of the log, which is too "
         "long to be judged (a model with this delay leaves {left:.0%} of the error): try --delay {samples}, or a "

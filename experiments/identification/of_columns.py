@@ -219,6 +219,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         told = (
             IdentificationCode.MORE_THAN_NOISE,
             IdentificationCode.MODEL_TOO_SMALL,
+            IdentificationCode.HIGHEST_ORDER_TAKEN,
             IdentificationCode.ERROR_MODELLED,
         )
         yield from (note["text"] for note in result["notes"] if note["code"] in told)

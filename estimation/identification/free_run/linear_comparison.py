@@ -12,6 +12,7 @@ from estimation.identification.free_run.candidate_rows import linear_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
 from estimation.identification.free_run.data import Channels, Scaling, scaled
 from estimation.identification.free_run.dense_polynomial import RequestedSizes
+from estimation.identification.free_run.held_back import CLEAR_MARGIN
 from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.integrating import refitted_linear
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
@@ -142,7 +143,20 @@ def linear_comparison(task: Task) -> LinearComparison:
     best, notes = believable_candidate(candidates, task.part, task.by)
     related = not best.outlasts_block(task.part) or linear_explains(best.fit, task.part)
     said = notes if related else [IdentificationCode.UNRELATED.note(output=task.data.output)]
-    return LinearComparison(task, candidates, best, related, [*said], [linear_row(one) for one in candidates])
+    said = [*said, *_highest_order_notes(candidates, best, task)]
+    return LinearComparison(task, candidates, best, related, said, [linear_row(one) for one in candidates])
+
+
+def _highest_order_notes(candidates: list[Candidate], best: Candidate, task: Task) -> list[Note]:
+    """Return a note if the data chose the highest order that was compared, by a clear margin."""
+    order, lower = best.form.order, [one.held_back for one in candidates if one.form.order < best.form.order]
+    if order < max(task.orders) or task.asked.order is not None or not lower:
+        return []
+    less = 1.0 - best.held_back / min(lower)
+    if less < CLEAR_MARGIN:
+        return []
+    told = {"order": order, "less": less, "more": order + 2, "output": task.data.output}
+    return [IdentificationCode.HIGHEST_ORDER_TAKEN.note(**told)]
 
 
 def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
