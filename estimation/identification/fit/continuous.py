@@ -155,7 +155,7 @@ class _Problem:
         n_main = form.n_numerator + form.n_denominator
         initial = jacobian[:, n_main:]
         if self.estimate_offset:
-            initial = np.column_stack([initial, self.data.used])
+            initial = np.column_stack([initial, self.data.used.astype(np.float64)])
         residual = residual - initial @ np.linalg.lstsq(initial, residual, rcond=None)[0]
         self._last = _ModelAtPoint(values.copy(), b, f, delay, jacobian[:, :n_main], initial, residual)
         return self._last
