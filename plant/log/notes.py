@@ -41,6 +41,10 @@ class LogCode(Code):
         "{channel} is logged only from {begin_s:.4g} s to {end_s:.4g} s; only this part of the log is used"
     )
     LINES_SKIPPED = "comments or repeated headers between the rows of data were skipped (lines: {count})"
+    SEGMENTS_JOINED = (
+        "time begins again in segments of the file (segments: {count}); it was counted on from the date and time of "
+        "each"
+    )
     ROWS_LEFT_OUT = "lines that are not rows of data were left out (lines: {count}, the first is {line}: {said!r})"
     CELLS_NO_NUMBERS = (
         "column {column!r} has cells that are not numbers; these were left out (cells: {count}, the first is {said!r} "
@@ -55,6 +59,10 @@ class LogCode(Code):
     SCALE_IN_HEADER = (
         "the file states the scale factor {factor:g} and the offset {offset:g} for column {column!r}, but not whether "
         "its values are scaled already: check them; a unit such as '{factor:g} bar' scales them"
+    )
+    TIME_STRAYS = (
+        "{channel} changes by {step_s:.6g} s between the {end} row and the one beside it, which does not fit the other "
+        "rows; that row was left out"
     )
     TIME_RAN_OVER = (
         "{channel} falls back by {span_s:.10g} s, like a counter that overflows (places: {count}, the first at row "

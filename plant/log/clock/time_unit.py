@@ -6,11 +6,22 @@ from plant.arrays import Array
 
 _UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0))
 
+TICKS = "100 ns"
+"""The unit in which Windows counts time."""
+
+_TICK = 1e-7
+"""What one of them lasts [s]."""
+
 _DATE_RANGE = (946_684_800.0, 2_524_608_000.0)
 """Beginning of 2000 and of 2050, counted from 1970 [s]."""
 
-_EPOCH_OFFSETS = (("d", 25_569.0), ("d", 719_529.0))
-"""Where spreadsheets and MATLAB's datenum have the beginning of 1970, and their unit."""
+_EPOCH_OFFSETS = (
+    ("d", 25_569.0),
+    ("d", 719_529.0),
+    (TICKS, 116_444_736_000_000_000.0),
+    (TICKS, 621_355_968_000_000_000.0),
+)
+"""Where spreadsheets, MATLAB's datenum, Windows and .NET have the beginning of 1970, and their unit."""
 
 STEP_RANGE = (1e-6, 10.0)
 """Steps of a log that dates may have [s]; judged: wider than those of any bench."""
@@ -22,7 +33,8 @@ USUAL_STEP = 1e-3
 def unit_of_dates(values: Array) -> tuple[str, str] | None:
     """Return the unit in which values are dates since 2000, and the first date; None if they are not dates.
 
-    Dates count from 1970 in s, ms, us or ns, or in days as in spreadsheets and MATLAB.
+    Dates count from 1970 in s, ms, us or ns, in days as in spreadsheets and MATLAB, or in ticks of 100 ns as in
+    Windows (from 1601) and .NET (from the year 1).
 
     Parameters
     ----------
@@ -33,11 +45,13 @@ def unit_of_dates(values: Array) -> tuple[str, str] | None:
     --------
     >>> unit_of_dates(46_000.0 + 1e-8 * np.arange(20.0)), unit_of_dates(46_000.0 + 0.01 * np.arange(20.0))
     (('d', '2025-12-09T00:00:00'), None)
+    >>> unit_of_dates(134_176_000_000_000_000.0 + 1e4 * np.arange(20.0))
+    ('100 ns', '2026-03-10T07:06:40')
     """
     there = values[np.isfinite(values)]
     step, first = _usual_step(values), float(there[0]) if len(there) else np.nan
     for unit, zero in (*((unit, 0.0) for unit, _ in _UNITS[:4]), *_EPOCH_OFFSETS):
-        factor = dict(_UNITS)[unit]
+        factor = _TICK if unit == TICKS else dict(_UNITS)[unit]
         since = (first - zero) * factor
         if _DATE_RANGE[0] <= since <= _DATE_RANGE[1] and STEP_RANGE[0] <= step * factor <= STEP_RANGE[1]:
             return unit, str(np.datetime64(0, "s") + np.timedelta64(round(since), "s"))

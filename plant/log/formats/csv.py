@@ -20,6 +20,7 @@ from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
 from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
+from plant.log.formats.lvm_segments import joined_segments
 from plant.log.formats.packed import open_unpacked, packing_of
 from plant.log.formats.thousands import may_group_thousands, require_none_grouped
 from plant.log.notes import LogCode
@@ -179,14 +180,19 @@ def _lines_if_quoted(source: Path | bytes, layout: Layout) -> int | None:
 
 def _read_cells(path: Path, layout: Layout, chosen: Sequence[Column]) -> dict[Column, Array]:
     """Read line by line what pyarrow cannot read, or name the row and column that is not a number."""
-    with _rows(path, layout) as rows:
-        return read_cells(rows, layout, chosen, str(path))
+    moved: list[float] = []
+    with _rows(path, layout, moved) as rows:
+        found = read_cells(rows, layout, chosen, str(path))
+    if moved:
+        warnings.warn(LogWarning(LogCode.SEGMENTS_JOINED.note(count=len(moved)), str(path)), stacklevel=2)
+    return found
 
 
 @contextmanager
-def _rows(path: Path, layout: Layout) -> Generator[Iterator[list[str]]]:
+def _rows(path: Path, layout: Layout, moved: list[float] | None = None) -> Generator[Iterator[list[str]]]:
     """Open the lines below the header, as lists of cells."""
     with _text(path, layout) as text:
         # concatenated files have byte order marks in the middle
         lines = (line.rstrip("\n").removeprefix("\ufeff") for line in islice(text, layout.skipped, None))
-        yield (cells_of(line, layout.delimiter) if line else [] for line in lines)
+        rows = (cells_of(line, layout.delimiter) if line else [] for line in lines)
+        yield joined_segments(rows, layout, [] if moved is None else moved) if layout.began else rows

@@ -71,7 +71,7 @@ def read_cells(
     block: list[_Row] = []
     row = 0
     for line, cells in enumerate(rows, start=layout.skipped + 1):
-        if not cells or (len(cells) == 1 < len(names) and not cells[0].strip()):
+        if len(cells) != len(names) and not "".join(cells).strip():
             continue
         first = cells[0].strip().removeprefix("\ufeff")
         comment = COMMENT.match(first) and first not in MISSING

@@ -20,14 +20,7 @@ from plant.log.formats.cell_texts import (
     unit_behind,
     without_unit,
 )
-from plant.log.formats.csv_loggers import (
-    HEADER_ENDS,
-    LABVIEW,
-    TWINCAT_STEP,
-    with_labview_header,
-    with_twincat_clock,
-    without_remarks,
-)
+from plant.log.formats.csv_loggers import LOGGERS, Text, without_remarks
 from plant.log.formats.layouts_seen import remember_layout, remembered_layout
 from plant.log.formats.packed import open_unpacked
 from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
@@ -79,6 +72,8 @@ class Layout:
         Units that stand behind each number of a column, by its place.
     scales : Mapping[int, tuple[float, float]]
         Scale factor [1] and offset [unit of the column] that the file states, by the column's place; applied or not.
+    began : str
+        Date and time of the first of several segments, of which each has a header; empty for other logs.
     """
 
     headings: tuple[Heading, ...]
@@ -90,6 +85,7 @@ class Layout:
     step: float | None = None
     in_cells: Mapping[int, str] = field(default_factory=dict[int, str])
     scales: Mapping[int, tuple[float, float]] = field(default_factory=dict[int, tuple[float, float]])
+    began: str = ""
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -178,9 +174,7 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     """
     if not any(line.strip() for line in lines):
         raise LogError("a header line is needed, but the file is empty", source)
-    if lines[0].startswith(LABVIEW) and (found := _of_labview(lines, encoding, source)) is not None:
-        return found
-    if (found := _of_twincat(lines, encoding, source)) is not None:
+    if (found := _of_logger(lines, encoding, source)) is not None:
         return found
     head = "\n".join(lines[:5])
     strange = sum(one == "\ufffd" or (ord(one) < 32 and one not in "\t\n\x0c\x0b") for one in head)
@@ -199,27 +193,17 @@ def layout_of_lines(lines: Sequence[str], encoding: str, source: str) -> Layout:
     return made
 
 
-def _of_labview(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
-    """Return the layout of a LabVIEW measurement file: two headers above the names, with units and the time step."""
-    ends = [place for place, line in enumerate(lines) if line.startswith(HEADER_ENDS)]
-    if not ends:
-        return None
-    # a third one ends the header of another segment, whose rows do not belong to this segment
-    last = ends[:2][-1]
-    layout = layout_of_lines(without_remarks(lines[last + 1 :]), encoding, source)
-    told = with_labview_header(layout, [cells_of(line, layout.delimiter) for line in lines[:last]])
-    return replace(told, skipped=layout.skipped + last + 1)
-
-
-def _of_twincat(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
-    """Return the layout of an export of TwinCAT Scope, None where its channels have clocks of their own."""
-    skipped = next((place for place, line in enumerate(lines) if re.match(r"[-+\d]", line)), None)
-    if skipped is None or not any(line.startswith(TWINCAT_STEP) for line in lines[:skipped]):
-        return None
-    layout = layout_of_lines(lines[skipped:], encoding, source)
-    above, rows = ([cells_of(one, layout.delimiter) for one in some] for some in (lines[:skipped], lines[skipped:]))
-    told = with_twincat_clock(layout, above, rows)
-    return None if told is layout else replace(told, skipped=layout.skipped + skipped)
+def _of_logger(lines: Sequence[str], encoding: str, source: str) -> Layout | None:
+    """Return the layout of an export whose header tells more than names and units; None for other texts."""
+    for begin, with_header in LOGGERS:
+        if (skipped := begin(lines)) is None:
+            continue
+        below = without_remarks(lines[skipped:])
+        layout = layout_of_lines(below, encoding, source)
+        above, rows = ([cells_of(one, layout.delimiter) for one in some] for some in (lines[:skipped], below))
+        if (told := with_header(layout, Text(above, rows, source))) is not None:
+            return replace(told, skipped=layout.skipped + skipped)
+    return None
 
 
 def _header_parts_at_commas(lines: Sequence[str], block: "_Block") -> bool:

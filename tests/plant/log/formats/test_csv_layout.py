@@ -153,11 +153,60 @@ def test_a_twincat_scope_log_has_one_clock_in_milliseconds_if_all_its_channels_s
     assert (made.decimal_point, made.skipped) == (",", 8)
     assert names(scope("1", rows)) == ["Name", "Way", "Name", "Speed"]  # the clock is not in milliseconds
     skewed = [row.replace("\t", "\t", 1).replace(f"\t{2 * k}\t", f"\t{2 * k + 1}\t") for k, row in enumerate(rows)]
-    assert names(scope("2", skewed)) == ["Name", "Way", "Name", "Speed"]
+    with pytest.raises(LogError, match="its channels have clocks that differ"):
+        scope("2", skewed)
     again = ["Name\tWay\tName\tSpeed", "SampleTime[ms]\t2\tSampleTime[ms]\t2", *rows]
     assert scope("2", [*rows, *again]).skipped == 6
     for hostile in ([], ["0\t1"], ["x\ty\tz\tw"] * 5):
         assert scope("2", hostile).headings
+
+
+def test_full_time_stamps_of_twincat_scope_have_no_unit_but_their_size() -> None:
+    def ticks(k: int) -> int:
+        return 134_176_000_000_000_000 + 20_000 * k
+
+    rows = [f"{ticks(k)}\t1,{k}\t{ticks(k)}\t3,{k}" for k in range(5)]
+    made = scope("2", rows, "Unit\tum\tUnit\trpm")
+    assert [(one.name, one.unit) for one in made.headings[:2]] == [("Time", None), ("Way", "um")]
+    assert names(scope("3", rows)) == ["Name", "Way", "Name", "Speed"]
+    short = layout("Name\tProject", "Starttime of export\t134176000000000000", "", "Name\tWay\tName\tSpeed", "", *rows)
+    assert [(one.name, one.unit) for one in short.headings[:2]] == [("Time", None), ("Way", None)]
+
+
+def test_the_fastest_clock_of_twincat_scope_is_the_time_if_slow_channels_are_held() -> None:
+    above = ("Name\tProject", "", "Name\tWay\tName\tSpeed", "SampleTime[ms]\t4\tSampleTime[ms]\t2", "")
+    held = [f"{4 * (k // 2)}\t1,{k}\t{2 * k}\t3,{k}" for k in range(9)]
+    assert names(layout(*above, *held)) == ["Time of Way", "Way", "Time", "Speed"]
+    ahead = [f"{4 * k}\t1,{k}\t{2 * k}\t3,{k}" for k in range(9)]
+    ended = [*ahead[:4], *(f"\t\t{2 * k}\t3,{k}" for k in range(4, 9))]
+    for rows in (ahead, ended):
+        with pytest.raises(LogError, match=r"a\.csv: its channels have clocks that differ"):
+            layout(*above, *rows)
+    still = [one.replace("\t2", "\t0") for one in above]
+    assert "Time" not in names(layout(*still, *held))
+
+
+def test_signal_express_gives_names_and_the_time_step_above_its_rows() -> None:
+    begin = "3/12/2026 10:11:12.345678"
+
+    def made(step: str = "0.002\t0.002", begins: str = f"{begin}\t{begin}", tabs: str = "") -> Layout:
+        told = ("channel names:", "Way\tSpeed", "start times:", begins, "dt:", step, "data:")
+        padded = [f"{one}{tabs}" if one.endswith(":") else one for one in told]
+        return layout(*padded, *(f"{0.1 * k}\t{k}" for k in range(9)))
+
+    for tabs in ("", "\t"):
+        assert (names(made(tabs=tabs)), made(tabs=tabs).step, made(tabs=tabs).skipped) == (["Way", "Speed"], 2e-3, 7)
+    assert made("x\ty").step is None
+    assert made("0.002\t0.001").step is None
+    assert made(begins=f"{begin}\t{begin[:-4]}6000").step == 2e-3
+    with pytest.raises(LogError, match="its channels have clocks that differ"):
+        made(begins=f"{begin}\t3/12/2026 10:11:12.355678")
+
+
+def test_labview_channels_of_several_time_steps_without_a_time_are_refused() -> None:
+    above = ("LabVIEW Measurement", "X_Columns\tNo", "***End_of_Header***", "Delta_X\t0.001\t0.002")
+    with pytest.raises(LogError, match="its channels have clocks that differ"):
+        layout(*above, "***End_of_Header***", "X_Value\tWay\tSpeed", *(f"\t{k}\t{k}" for k in range(9)))
 
 
 def test_a_scale_that_a_twincat_header_states_is_kept_with_its_column() -> None:
