@@ -71,6 +71,34 @@ def _longest_regular_step(step: Array) -> float:
     return GAP * max(usual_step(step), float(np.min(step[step > 0.0], initial=np.inf)))
 
 
+def stray_ends(time: Array, most_missing: float) -> tuple[int, ...]:
+    """Return the first and the last row where their time alone does not fit: 0, -1, both or none.
+
+    A logger may stamp its first row late, or before its clock is set, and its last row when it is already off. A time
+    does not fit if it falls back, or leaves a gap of more samples than a log may lack.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        The stamps [s].
+    most_missing : float
+        Share of the samples that a log may lack [fraction].
+
+    Examples
+    --------
+    >>> even = 0.01 * np.arange(100.0)
+    >>> stray_ends(np.r_[0.015, even[1:]], 0.05), stray_ends(np.r_[even[:-1], 0.0], 0.05), stray_ends(even, 0.05)
+    ((0,), (-1,), ())
+    """
+    step = np.diff(time)
+    usual = usual_step(step) if (step > 0.0).any() else 0.0
+    wrong = np.flatnonzero((step < 0.0) | (step > most_missing * len(time) * usual))
+    ends = {0: 0, len(step) - 1: -1}
+    if not usual > 0.0 or not len(wrong) or any(int(row) not in ends for row in wrong):
+        return ()
+    return tuple(ends[int(row)] for row in wrong)
+
+
 def without_overruns(time: Array) -> tuple[Array, tuple[int, int, float] | None]:
     """Return stamps of a counter that overflowed, as if it had gone on counting.
 

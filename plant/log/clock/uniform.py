@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from plant.arrays import Array
 from plant.errors import ClockError, LogError, SparseLogError
 from plant.log.clock.jitter import GAP, grid_of, resampled, rounded_clock, usual_step
-from plant.log.clock.jumps import without_jumps, without_overruns
+from plant.log.clock.jumps import stray_ends, without_jumps, without_overruns
 from plant.log.clock.stalls import is_sampled_evenly, stalled_clock
 from plant.log.columns import TIME
 from plant.log.notes import LogCode
@@ -30,6 +30,8 @@ WHOLE_STEP_TOLERANCE = 0.01
 
 ROUNDING = 1e-6
 """Share of the sample time by which stamps may be off beside what they are rounded to [fraction]; judged."""
+
+_ENDS = {0: "first", -1: "last"}
 
 Channels = Mapping[str, Array]
 
@@ -107,6 +109,11 @@ def on_uniform_clock(
     if overruns is not None:
         count, row, span = overruns
         notes.append(LogCode.TIME_RAN_OVER.note(channel=TIME, count=count, row=row + 1, span_s=span))
+    if len(time) > FEWEST_SAMPLES + 2 and (strays := stray_ends(time, most_missing)):
+        step = np.diff(time)
+        notes += [LogCode.TIME_STRAYS.note(channel=TIME, step_s=float(step[one]), end=_ENDS[one]) for one in strays]
+        time, *rest = (np.delete(one, strays) for one in (time, *channels.values()))
+        channels = dict(zip(channels, rest, strict=True))
     if _has_own_times(channels):
         return _merge_own_times(time, channels, source, notes)
     ticks = _whole_ticks(time)

@@ -83,3 +83,25 @@ def test_a_restarted_test_is_not_taken_for_a_counter_overflow(rows: int) -> None
 def test_a_single_backward_step_of_slow_stamps_is_not_taken_for_a_counter_overflow() -> None:
     time = np.arange(1000.0)
     assert without_overruns(time - 65.0 * (time > 500.0))[1] is None
+
+
+@pytest.mark.parametrize(
+    ("row", "stamp", "end", "step"),
+    [(0, 0.015, "first", -0.005), (0, -700.0, "first", 700.01), (1999, 0.0, "last", -19.98)],
+)
+def test_a_first_or_last_row_whose_time_does_not_fit_is_left_out_with_a_note(
+    row: int, stamp: float, end: str, step: float
+) -> None:
+    seconds = EVEN.copy()
+    seconds[row] = stamp
+    sample_time, length, (note,) = read(seconds)
+    assert (sample_time, length) == (pytest.approx(0.01), len(EVEN) - 1)
+    assert str(note) == str(LogCode.TIME_STRAYS.note(channel="time_s", step_s=step, end=end))
+
+
+def test_rows_at_an_end_that_fit_are_kept_and_others_within_are_refused() -> None:
+    assert read(np.delete(EVEN, np.arange(1, 60)))[1] == len(EVEN)  # 3 % are missing, which a log may lack
+    within = EVEN.copy()
+    within[[0, 1000]] = 0.015, 0.0
+    with pytest.raises(LogError, match="must increase"):
+        read(within)
