@@ -36,12 +36,15 @@ SPELLINGS: Mapping[str, str] = {
     "Volt": "V",
     "Volts": "V",
     **GAUGE,
-    "psid": "psi",
+    **dict.fromkeys(("psid", "lb/in2", "lb/in^2"), "psi"),
     **dict.fromkeys(("kg/cm2", "kg/cm^2"), "kgf/cm^2"),
 }
 """Spellings used on benches, and their meaning."""
 
-_TURNS = {"1/min", "min^-1", "u/min", "umdr/min", "tr/min", "r/min", "rev/min", "rpm", "upm"}
+_TURNS = {
+    *("1/min", "min^-1", "u/min", "umdr/min", "tr/min", "r/min", "rev/min", "rpm", "upm"),
+    *("giri/min", "obr/min", "ot/min", "varv/min", "omw/min"),
+}
 """Revolutions per minute, in lower case; a shaft's speed is often written without the angle."""
 
 _CASELESS = {

@@ -22,8 +22,8 @@ from plant.log.guess import Guess, best_guesses, points_by_name
 from plant.log.headings import Heading
 from plant.log.inspection import clock_facts
 from plant.log.plausibility import LIMITS, SAMPLE_TIME_RANGE
+from plant.log.scale import conversion_of
 from plant.notes import Note
-from plant.units import conversion_to
 
 PORTS, VOLTAGE = ("pressure_a_pa", "pressure_b_pa"), "motor_voltage_v"
 
@@ -347,4 +347,4 @@ def _usual_units(channel: str, values: Array, p: EhaParameters) -> list[str]:
 
 
 def _factor(unit: str, wanted: str) -> float:
-    return conversion_to(unit, wanted)[0]
+    return conversion_of(unit, wanted)[0]

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from plant.arrays import Array
 from plant.errors import HydrostateError, LogError, MissingColumnError, RigError
 from plant.log.headings import Heading, headings_of
-from plant.log.scale import conversion_of
+from plant.log.scale import conversion_of, measures
 from plant.units import converts
 
 CHANNELS: Mapping[str, str] = {
@@ -186,7 +186,7 @@ def _channel_of(heading: Heading) -> str | None:
         return name
     if heading.unit is not None and (known := STEMS.get(heading.stem + "_")):
         return known
-    if heading.stem in TIME_NAMES and heading.unit is not None and converts(heading.unit, "s"):
+    if heading.stem in TIME_NAMES and heading.unit is not None and measures(heading.unit, "s"):
         return TIME
     stems = [stem for stem in STEMS if name.startswith(stem) and name != stem and not _PART.search(name)]
     return STEMS[max(stems, key=len)] if stems and heading.name == heading.bare else None

@@ -11,8 +11,9 @@ from plant.log.chamber_pressures import CHAMBERS, PRESSURE, has_pressure_differe
 from plant.log.columns import CHANNELS, TIME, UNITS, list_in_words, unit_ending
 from plant.log.headings import Heading, is_misspelt
 from plant.log.notes import LogCode
+from plant.log.scale import measures
 from plant.notes import Note
-from plant.units import LOWER_CASE, converts
+from plant.units import LOWER_CASE
 
 NAMES: Mapping[str, tuple[tuple[str, float], ...]] = {
     TIME: (
@@ -132,7 +133,7 @@ def points_by_name(heading: Heading, channel: str) -> float | None:
     if heading.stamped:
         return 8.0 if channel == TIME else None
     unit = unit_of(heading)
-    fits = unit is not None and converts(unit, UNITS[channel])
+    fits = unit is not None and measures(unit, UNITS[channel])
     if unit is not None and not fits:
         return None
     name = heading.stem.removesuffix("_pa") if unit == "Pa" else heading.stem  # "_pa" is the unit, not chamber A
@@ -314,7 +315,7 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
     timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
     # one of the columns in V is probably the drive
-    volts = not options and sum(one.unit is not None and converts(one.unit, "V") for one in headings) > 1
+    volts = not options and sum(one.unit is not None and measures(one.unit, "V") for one in headings) > 1
     scale = (
         "; a column in V needs its sensor's scale: --columns 'position_m=NAME:20 mm/V', for example" if volts else ""
     )

@@ -157,7 +157,7 @@ def names_and_units(above: Sequence[list[str]], width: int) -> tuple[list[str], 
     """
     units: list[str | None] = [None] * width
     names = above
-    for row in above[1:]:
+    for row in [*above[1:], *above[:1]] if len(above) > 1 else []:  # units rarely stand above the names
         if is_unit_row(row):
             said = [_UNIT_LABEL.sub("", cell) for cell in row]
             units = [unit_or_none(cell.strip("[]()")) if is_unit(cell) else None for cell in said]

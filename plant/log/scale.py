@@ -52,6 +52,21 @@ def conversion_of(unit: str, wanted: str, logged: str | None = None) -> tuple[fl
     return (-factor if minus else factor), (-offset if direction == "-" else offset)
 
 
+def measures(unit: str, wanted: str) -> bool:
+    """Return whether a unit, or a scale such as ``100 ns``, measures the same quantity as a wanted unit.
+
+    Examples
+    --------
+    >>> measures("100 ns", "s"), measures("50 bar", "Pa"), measures("V", "Pa")
+    (True, True, False)
+    """
+    try:
+        conversion_of(unit, wanted)
+    except ValueError:
+        return False
+    return True
+
+
 def _factor(name: str, wanted: str, logged: str | None) -> float:
     """Return the factor of a unit, or of a unit divided by the unit in which the column is logged."""
     top, slash, under = name.rpartition("/")

@@ -48,7 +48,8 @@ _PATTERNS = (
             (rf"{_WEEKDAY}(?P<D>\d{{1,2}}){_OF}{_WORD}{_OF}(?P<Y>\d{{4}}|\d{{2}})", _AFTER_DAY),
             (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}}),?\s+(?P<Y>\d{{4}})", _AFTER_DAY),
             (rf"{_WEEKDAY}{_WORD}\s+(?P<D>\d{{1,2}})\s+{_CLOCK}", r"\s+(?P<Y>\d{4})"),
-            (r"(?:(?P<Y>\d{4})[-:])?(?P<N>\d{3})", rf"[T: ]{_CLOCK}"),
+            (r"(?:(?P<Y>\d{4})[-:])?(?P<N>\d{3})", rf"[T: /-]{_CLOCK}"),
+            (r"(?P<E>\d{1,5}) days?,?", rf" \+?{_CLOCK}"),
             (r"(?P<Y>\d{4})(?P<M>\d{2})(?P<D>\d{2})", _COMPACT),
         )
     ),
@@ -56,6 +57,9 @@ _PATTERNS = (
     re.compile(rf"{_CLOCK}{_ZONE}"),
 )
 _MINUTES = re.compile(r"(?P<m>\d{1,3}):(?P<s>\d{2})[.,](?P<f>\d{1,12})")
+_MOST_DAYS, _LEAST_DAYS = 367, 363
+"""Days that no day of a year reaches, and by which stamps fall back at its end [count]."""
+
 _DAY, _SECOND = 86_400_000_000_000, 1_000_000_000
 _EPOCH = date(1970, 1, 1)
 _ISO = re.compile(r"(?:1[89]|2[01])\d{2}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(?:\.(\d{1,9}))?(Z|[-+]\d{2}:?\d{2})?")
@@ -193,7 +197,9 @@ def _fraction(digits: str | None) -> int:
 
 
 def _day(part: "dict[str, Any]", *, months_first: bool) -> int:
-    """Return the day since 1970; 0 if a stamp has no day, and the day of the year if it has no year."""
+    """Return the day since 1970; 0 if a stamp has no day, the day of the year if it has no year, or days elapsed."""
+    if part.get("E") is not None:
+        return int(part["E"])
     if part.get("Y") is None:
         return 0 if part.get("N") is None else _day_of_year(part["N"])
     year = int(part["Y"])
@@ -222,6 +228,8 @@ def _day_of_year(text: str) -> int:
 def continue_over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
     """Move times without a date to the next day where they fall back by most of a day.
 
+    Times of a day of the year are moved to the next year where they fall back by a year.
+
     Parameters
     ----------
     stamps : ndarray of int64, shape (n,)
@@ -233,10 +241,14 @@ def continue_over_midnight(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
         The times [ns].
     """
     there = stamps != np.iinfo(np.int64).min
-    if not there.any() or stamps[there].max() >= 2 * _DAY:
+    if not there.any() or stamps[there].max() >= _MOST_DAYS * _DAY:
         return stamps
     inside = stamps[there]
-    days = np.concatenate(([0], np.cumsum(np.diff(inside) < -_DAY // 2)))
+    if inside.max() >= 2 * _DAY:  # days of the year: 1 January may follow the last
+        ended = np.diff(inside) < -_LEAST_DAYS * _DAY
+        days = np.concatenate(([0], np.cumsum(np.where(ended, inside[:-1] // _DAY + 1, 0))))
+    else:
+        days = np.concatenate(([0], np.cumsum(np.diff(inside) < -_DAY // 2)))
     out = stamps.copy()
     out[there] = inside + _DAY * days
     return out

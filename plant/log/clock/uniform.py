@@ -31,6 +31,9 @@ WHOLE_STEP_TOLERANCE = 0.01
 ROUNDING = 1e-6
 """Share of the sample time by which stamps may be off beside what they are rounded to [fraction]; judged."""
 
+MOST_ROUNDED = 0.1
+"""Rounding of stamps to floats up to which their steps are still counted [sample times]; judged."""
+
 _ENDS = {0: "first", -1: "last"}
 
 Channels = Mapping[str, Array]
@@ -250,14 +253,19 @@ def _merge_own_times(time: Array, channels: Channels, source: str, notes: list[N
 
 
 def _whole_ticks(time: Array) -> Array | None:
-    """Return the number of sample times in each step; None if a step is not a whole number within 1 %."""
+    """Return the number of sample times in each step; None if a step is not a whole number within 1 %.
+
+    Stamps that count from a distant date are rounded to the digits of a float, which is no jitter.
+    """
     step = np.diff(time)
     if step.min() <= 0.0:
         return None
     nominal = usual_step(step)
     ticks = np.rint(step / nominal)
     off = np.abs(step / nominal - ticks)
-    return ticks if np.all(ticks >= 1.0) and np.max(off) <= WHOLE_STEP_TOLERANCE + ROUNDING else None
+    rounded = _resolution(time, nominal)
+    tolerance = max(WHOLE_STEP_TOLERANCE, rounded if rounded < MOST_ROUNDED else 0.0)
+    return ticks if np.all(ticks >= 1.0) and np.max(off) <= tolerance + ROUNDING else None
 
 
 def _require_few_left_out(

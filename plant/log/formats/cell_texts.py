@@ -27,6 +27,11 @@ def is_value(cell: str) -> bool:
     return plain or bool(unit_behind(text)) or is_stamp(text)
 
 
+def is_text(cell: str) -> bool:
+    """Return whether a cell is neither empty nor data."""
+    return bool(cell.strip()) and not is_value(cell)
+
+
 def unit_behind(cell: str) -> str:
     """Return the unit that follows the number in a cell; empty if there is none.
 

@@ -15,12 +15,13 @@ from plant.log.formats.cell_texts import (
     NUMBER,
     is_data_row,
     is_label_row,
+    is_text,
     is_value,
     mostly_stamps,
     unit_behind,
     without_unit,
 )
-from plant.log.formats.csv_loggers import LOGGERS, Text, without_remarks
+from plant.log.formats.csv_loggers import LOGGERS, Text, stated_scales, without_remarks
 from plant.log.formats.layouts_seen import remember_layout, remembered_layout
 from plant.log.formats.packed import open_unpacked
 from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
@@ -248,7 +249,9 @@ class _Block:
             beneath = cells_of(lines[place - 1], self.delimiter)
             if place == 2 and not first and is_unit_row(beneath):
                 first = place  # the row above the units holds channel numbers
-        while first and is_data_row(cells_of(lines[first - 1], self.delimiter), width):
+        while first and is_data_row(cells := cells_of(lines[first - 1], self.delimiter), width):
+            if self._is_labelled(cells):
+                break
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
         names, units = names_and_units(_lines_above(lines[:first], self.delimiter, width, closed=closed), width)
@@ -265,7 +268,13 @@ class _Block:
             Heading(name, None if place in stamped else in_cells.get(place, unit), place in stamped)
             for place, (name, unit) in enumerate(zip(names, units, strict=True))
         )
-        return Layout(headings, first, self.delimiter, point, encoding, stamped, in_cells=in_cells)
+        above = {cells[0]: cells for line in lines[:first] if len(cells := cells_of(line, self.delimiter)) == width}
+        scales = stated_scales(above)
+        return Layout(headings, first, self.delimiter, point, encoding, stamped, in_cells=in_cells, scales=scales)
+
+    def _is_labelled(self, cells: Sequence[str]) -> bool:
+        """Return whether a row begins with a text where no row has anything, as `Length, 4000`."""
+        return is_text(cells[0]) and not any(row[0] for _, row in self.rows)
 
     def _decimal_point(self) -> str:
         cells = (without_unit(cell) for _, row in self.rows for cell in row)
@@ -308,6 +317,10 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
     full = {place for place, _, values in judged if 2 * sum(map(and_, numeric, values)) > count}
     while whole and is_label_row(whole[0][1], numeric) and not {whole[0][0], whole[0][0] + 1} <= full:
         del whole[0]  # above the names, such as a rate or a range
+    begins = ["".join(row[:1]) for _, row in whole]
+    labels = next((count for count, one in enumerate(begins) if not is_text(one)), 0)
+    if not any(begins[labels:]):  # texts stand only in front of rows above the data
+        del whole[:labels]
     return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
 
 
@@ -326,8 +339,8 @@ def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bo
         cells = [cell.strip().removeprefix("\ufeff") for cell in cells_of(plain, delimiter)]
         if delimiter == BLANKS and len(cells) != width:
             cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]
-        if closed and len(cells) == width - 1:
-            cells.append("")
+        if (closed and len(cells) == width - 1) or (1 < len(cells) < width and is_unit_row(cells)):
+            cells += [""] * (width - len(cells))
         if len(cells) == width + 1 and not cells[-1]:
             del cells[-1]
         if len(cells) != width or not any(cells):

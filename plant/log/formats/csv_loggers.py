@@ -35,8 +35,13 @@ _LEAST_TICKS = 1e16
 _CLOCKS = ((Heading("Time", "ms"), 1.0), (Heading("Time"), 1e-4))
 """The heading of its clocks, and what they count in [ms]."""
 
-_SCALE_ROWS = ("scalefactor", "offset")
-"""How it says the scale of each channel, which its export applies or not, and does not say."""
+_NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?")
+
+_SCALE_ROWS = tuple(
+    re.compile(one, re.IGNORECASE)
+    for one in (r"scal(?:e|ing)(?:[ _]?factor)?|factor|faktor|gain|slope|multiplier|skalierung(?:sfaktor)?", r"offset")
+)
+"""How headers call the scale of each channel, and its offset; whether they are applied already, none says."""
 
 
 class Text(NamedTuple):
@@ -188,7 +193,7 @@ def with_twincat_clock(layout: "Layout", text: Text) -> "Layout | None":
     for place in clocks:
         beside = "".join(names[place + 1 : place + 2]).strip()
         headings[place] = clock if place == fastest else Heading(f"Time of {beside}")
-    return replace(layout, headings=tuple(headings), scales=_stated_scales(said))
+    return replace(layout, headings=tuple(headings), scales=stated_scales(said))
 
 
 def _is_held(slow: Sequence[float], fast: Sequence[float]) -> bool:
@@ -198,15 +203,31 @@ def _is_held(slow: Sequence[float], fast: Sequence[float]) -> bool:
     return all(here == there or here < there < here + longest for here, there in zip(slow, fast, strict=True))
 
 
-def _stated_scales(said: Mapping[str, Sequence[str]]) -> dict[int, tuple[float, float]]:
-    """Return the scale factors and offsets that differ from 1 and 0, by the place of their column."""
-    factors, offsets = (next((row for key, row in said.items() if key.lower() == name), ()) for name in _SCALE_ROWS)
+def stated_scales(said: Mapping[str, Sequence[str]]) -> dict[int, tuple[float, float]]:
+    """Return the scale factors and offsets that a header gives and that differ from 1 and 0, by the column's place.
+
+    Parameters
+    ----------
+    said : Mapping[str, sequence of str]
+        Cells of the lines above the rows, by the first cell.
+
+    Returns
+    -------
+    dict[int, tuple[float, float]]
+        Factor and offset.
+
+    Examples
+    --------
+    >>> stated_scales({"Factor": ["Factor", "1", "0,5"], "Unit": ["Unit", "s", "bar"]})
+    {2: (0.5, 0.0)}
+    """
+    factors, offsets = (
+        next((row for key, row in said.items() if one.fullmatch(key.strip().rstrip(":"))), ()) for one in _SCALE_ROWS
+    )
     found: dict[int, tuple[float, float]] = {}
     for place, texts in enumerate(zip_longest(factors, offsets, fillvalue="")):
-        try:
-            factor, offset = (float(one.replace(",", ".") or neutral) for one, neutral in zip(texts, "10", strict=True))
-        except ValueError:
-            continue
+        numbers = [one if _NUMBER.fullmatch(one.strip()) else neutral for one, neutral in zip(texts, "10", strict=True)]
+        factor, offset = (float(one.strip().replace(",", ".")) for one in numbers)
         if (factor, offset) != (1.0, 0.0):
             found[place] = factor, offset
     return found

@@ -74,9 +74,18 @@ REFUSED: Mapping[str, str] = {
     "blf": "a log of a bus by Vector (.blf) cannot be read: convert its signals to MDF or CSV",
     "sqlite": "a database cannot be read: export the table that holds the log as CSV or Parquet",
     "markup": "a file of XML or HTML cannot be read: export the log as CSV, XLSX or TDMS",
+    "frames": "raw frames of a bus cannot be read: decode them with the description of its signals (DBC, ARXML), and "
+    "export these as CSV, MDF or Parquet",
     "ods": "a sheet of OpenDocument (.ods) cannot be read: save it as .xlsx or .csv",
 }
 """Formats that are known and not read, and what to do."""
+
+
+FRAMES = re.compile(
+    rb";\$FILEVERSION=|date [^\r\n]*\r?\n\s*base\s+(?:hex|dec)\b|\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]{3,8}##?[0-9A-Fa-f]",
+    re.IGNORECASE,
+)
+"""How traces of a bus begin as text: of PCAN-View, of Vector (.asc), and of candump."""
 
 
 def format_of(path: Path) -> str:
@@ -122,6 +131,8 @@ def _by_suffix(path: Path, start: bytes) -> str:
     text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if kind == "csv" and re.match(rb"<(?:\?xml|!doctype|html|table)\b", text, re.IGNORECASE):
         return "markup"
+    if kind == "csv" and FRAMES.match(text):
+        return "frames"
     if kind == "csv" and re.match(rb'\{\s*"|\[\s*[\[{]', text):
         return "json"
     return kind if b"\0" in start or kind in ("mat", "xls") else "csv"

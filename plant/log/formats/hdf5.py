@@ -10,11 +10,15 @@ import numpy as np
 
 from plant.errors import LogError
 from plant.log.formats.extras import library
-from plant.log.formats.mat import METADATA, NO_VECTORS, STRUCT, columns_of_array
+from plant.log.formats.mat import METADATA, NO_VECTORS, STRUCT, columns_of_array, tables_of
+from plant.log.formats.mat73_values import OBJECT, has_parts, variables_with_parts
 from plant.log.formats.packed import most_unpacked, too_large
 from plant.log.table import Table, table_of
 
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNIT")
+LONGEST_NAME = 1000
+"""Bytes of the longest name that stands beside a data set."""
+
 NAME_ATTRIBUTES = ("columns", "names", "column_names", "channels")
 
 PACKING_ATTRIBUTES = ("_FillValue", "missing_value", "scale_factor", "add_offset")
@@ -49,7 +53,11 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     texts: dict[str, str] = {}
     elsewhere = False
     with h5py.File(path, "r") as file:
+        if has_parts(h5py, file):
+            return tables_of(variables_with_parts(h5py, file, most, str(path)), str(path))
         for name, one in _data_sets(h5py, file):
+            if OBJECT in one.attrs:
+                continue
             group, _, leaf = name.rpartition("/")
             if one.is_virtual or one.external:
                 elsewhere = True
@@ -106,7 +114,11 @@ def _columns(one: Any, leaf: str) -> dict[str, Any]:
     if kind.names is not None:
         if values.ndim != 1:
             return {}
-        return {name: values[name] for name in kind.names if kind[name].kind in "fiub" and kind[name].shape == ()}
+        found: dict[str, Any] = {}
+        for name in kind.names:
+            if kind[name].base.kind in "fiub":
+                found |= columns_of_array(name, values[name]) if kind[name].shape else {name: values[name]}
+        return found
     values = values.squeeze()
     if values.ndim == 2 and _attribute(one, "MATLAB_class"):
         values = values.T  # MATLAB stores arrays in column order
@@ -153,7 +165,14 @@ def _attribute(one: Any, name: str) -> str:
 
 
 def _names(one: Any) -> list[str]:
-    """Return the names that a data set gives its columns; empty if it gives none."""
+    """Return the names that a data set, or pandas beside it, gives its columns; empty if there are none."""
+    leaf = str(one.name).rpartition("/")[2]
+    beside = leaf.removesuffix("_values") + "_items"
+    if leaf.endswith("_values") and type(one.parent.get(beside, getlink=True)).__name__ == "HardLink":
+        items = one.parent[beside]
+        kind, shape = getattr(items, "dtype", None), getattr(items, "shape", None)
+        if kind is not None and kind.kind == "S" and kind.itemsize <= LONGEST_NAME and shape == one.shape[-1:]:
+            return [each.decode(errors="replace") for each in np.asarray(items[()])]
     for name in NAME_ATTRIBUTES:
         value = one.attrs.get(name)
         if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OSU":

@@ -11,7 +11,7 @@ from plant.arrays import Array
 from plant.errors import LogError
 from plant.log.formats.mat4_reader import is_version_4, read_variables_of_version_4
 from plant.log.formats.mat_reader import DamagedMatError, MatValue, read_variables
-from plant.log.formats.mat_structs import each_struct, structs_of
+from plant.log.formats.mat_structs import as_signal, each_struct, structs_of
 from plant.log.formats.modelica import modelica_columns
 from plant.log.table import Table, table_of
 
@@ -77,7 +77,7 @@ def tables_of(content: Mapping[str, MatValue], source: str) -> tuple[Table, ...]
         if recorded := _dspace_columns(value):
             made += [table_of(source, columns, units=units, label=name) for columns, units in recorded]
             continue
-        columns, units = _columns(value)
+        columns, units = _columns(as_signal(name, value))
         text = value.get(METADATA)
         if columns:
             said = text if isinstance(text, str) else None
@@ -145,7 +145,7 @@ def _simulink_columns(struct: Mapping[str, MatValue]) -> tuple[dict[str, Any], d
 
 
 def columns_of_array(name: str, values: Any) -> dict[str, Any]:
-    """Return a vector under its name, or each column of a matrix that is longer than wide.
+    """Return a vector under its name, or each column of a matrix, which is taken along its longer side.
 
     Parameters
     ----------
@@ -161,11 +161,15 @@ def columns_of_array(name: str, values: Any) -> dict[str, Any]:
 
     Examples
     --------
-    >>> list(columns_of_array("data", np.zeros((9, 2)))), list(columns_of_array("gain", np.array(1.0)))
-    (['data 1', 'data 2'], [])
+    >>> list(columns_of_array("data", np.zeros((9, 2)))), list(columns_of_array("ans", np.zeros((2, 9))))
+    (['data 1', 'data 2'], ['ans 1', 'ans 2'])
+    >>> list(columns_of_array("gain", np.array(1.0)))
+    []
     """
     if values.size < 2:
         return {}
+    if values.ndim == 2 and 1 < values.shape[0] < values.shape[1]:  # as the block To File writes its signals
+        values = values.T
     if values.ndim == 2 and values.shape[1] < values.shape[0] and values.shape[1] <= MOST_COLUMNS:
         return {f"{name} {place + 1}": values[:, place] for place in range(values.shape[1])}
     return {name: values}

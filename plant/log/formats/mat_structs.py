@@ -46,6 +46,45 @@ def structs_of(name: str, value: MatValue) -> dict[str, Struct]:
     )
 
 
+def as_signal(name: str, struct: Struct) -> Struct:
+    """Return a struct that holds the time and the samples of one signal under the signal's name; others as they are.
+
+    Structs of MATLAB's time series, and of programs that copy them, call the samples of each signal ``Data``.
+
+    Parameters
+    ----------
+    name : str
+        What the struct is called, with those around it: ``log.position``.
+    struct : Mapping[str, Any]
+        The struct.
+
+    Examples
+    --------
+    >>> list(as_signal("log.position", {"Time": np.arange(9.0), "Data": np.ones(9), "Name": ""}))
+    ['Time', 'position']
+    """
+    vectors = {field: value for field, value in struct.items() if _is_vector(value)}
+    times = [field for field in vectors if _has_time({field: vectors[field]})]
+    samples = [field for field in vectors if field.lower() in DATA[:-1]]  # y beside t is a name of its own
+    if len(vectors) != 2 or len(times) != 1 or len(samples) != 1 or not name:
+        return struct
+    said = _first_field(struct, NAMES)
+    called = said if isinstance(said, str) and said.strip() else name.rpartition(".")[2]
+    time, unit = (_unit_in(_first_field(struct, (info,))) for info in ("timeinfo", "datainfo"))
+    labels = _with_unit(times[0], time), _with_unit(called, _unit_in(struct) or unit)
+    return {label: np.ravel(vectors[one]) for label, one in zip(labels, (*times, *samples), strict=True)}
+
+
+def _unit_in(struct: Any) -> str:
+    """Return the unit that a struct states; empty if it states none."""
+    said = _first_field(struct, UNITS) if isinstance(struct, Mapping) else None
+    return said.strip() if isinstance(said, str) else ""
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
 def each_struct(value: MatValue) -> list[Struct]:
     """Return the structs of an array, or a single struct; empty for anything else.
 

@@ -10,6 +10,7 @@ from plant.errors import LogError
 from plant.log.columns import TIME, TIME_NAMES, TRUTH_PREFIX, Column
 from plant.log.headings import Heading
 from plant.log.table import Table
+from plant.units import converts
 
 
 def without_repeated_clocks(table: Table) -> Table:
@@ -27,7 +28,9 @@ def without_repeated_clocks(table: Table) -> Table:
     >>> [one.name for one in without_repeated_clocks(table_of("log", pairs)).headings]
     ['time', 'speed', 'time of way', 'way']
     """
-    named = [(place, _name_without_number(one)) for place, one in enumerate(table.headings) if _is_clock(one)]
+    told = [place for place, one in enumerate(table.headings) if _is_clock(one)]
+    timed = told or [place for place, one in enumerate(table.headings) if one.unit and converts(one.unit, "s")]
+    named = [(place, _name_without_number(table.headings[place])) for place in timed]
     clocks = [place for place, name in named if name == named[0][1]]  # a clock of another name may be asked for
     if len(clocks) < 2:
         return table

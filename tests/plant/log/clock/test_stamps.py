@@ -129,3 +129,22 @@ def test_minutes_and_seconds_without_hours_are_read() -> None:
 def test_months_are_read_in_german_french_spanish_and_italian(names: str, month: int) -> None:
     stamps = read_stamps([f"1 {name} 2026 12:00:00" for name in names.split()], lambda _, text: ValueError(text))
     assert set(stamps.astype("M8[D]").tolist()) == {date(2026, month, 1)}
+
+
+def test_days_that_have_elapsed_are_counted() -> None:
+    assert read("0 days 00:00:00", "0 days 23:59:59.500000", "1 day, 0:00:00.5", "2 days +00:00:01") == [
+        "1970-01-01T00:00:00.000",
+        "1970-01-01T23:59:59.500",
+        "1970-01-02T00:00:00.500",
+        "1970-01-03T00:00:01.000",
+    ]
+    assert not is_stamp("2 pieces 00:00:01")
+
+
+@pytest.mark.parametrize("apart", [":", "-", "/", " ", "T"])
+def test_a_day_of_the_year_goes_on_in_the_next_one(apart: str) -> None:
+    days = read(*(f"{day}{apart}{clock}" for day, clock in (("365", "23:59:59.5"), ("001", "00:00:00.5"))))
+    assert [one[:19] for one in days] == ["1970-12-31T23:59:59", "1971-01-01T00:00:00"]
+    leap = read(f"366{apart}23:59:59.5", f"001{apart}00:00:00.5", f"002{apart}00:00:00")
+    assert [one[:10] for one in leap] == ["1971-01-01", "1971-01-02", "1971-01-03"]
+    assert read(f"063{apart}23:59:59", f"062{apart}00:00:00")[1] == "1970-03-03T00:00:00.000"

@@ -271,6 +271,9 @@ def test_nested_structs_give_columns_with_both_names_and_a_file_without_vectors_
     [
         (b"|CF,2,1,1;|CK,1,3,1,1;", "imc FAMOS cannot be read: export it as CSV"),
         (b"#ROSBAG V2.0\n", "bag of ROS"),
+        (b";$FILEVERSION=1.1\r\n;$STARTTIME=46093.4\r\n", "raw frames of a bus cannot be read: decode them"),
+        (b"date Thu Mar 12 10:11:12 am 2026\r\nbase hex  timestamps absolute\r\n", "raw frames of a bus"),
+        (b"(1773310272.000000) can0 100#0001020304050607\n", "raw frames of a bus"),
         (b"\x89MCAP0\r\n", "bag of ROS"),
         (b"LOGG\x90\0\0\0", "by Vector"),
         (b"SQLite format 3\0", "export the table"),

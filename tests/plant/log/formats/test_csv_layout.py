@@ -256,3 +256,22 @@ def test_units_that_simulink_writes_below_the_names_are_read() -> None:
     above = ["time,n,x", ",Type: double,Type: double", ",Unit: rpm,Unit: mm", ",Interp: linear,Interp: zoh"]
     made = layout(*above, "0.0,1.5,2.5", "0.1,1.5,2.5", "0.2,1.5,2.5")
     assert [(one.name, one.unit) for one in made.headings] == [("time", None), ("n", "rpm"), ("x", "mm")]
+
+
+def test_rows_that_a_text_begins_are_no_data_where_no_row_has_anything_in_that_place() -> None:
+    rows = [f";{k};{9 * k}" for k in range(9)]
+    above = ("Name;Time;Way", "Unit;s;mm", "Length;9;9", "Factor;1;0,5")
+    made = layout(*above, *rows)
+    assert ([(one.name, one.unit) for one in made.headings[1:]], made.skipped) == ([("Time", "s"), ("Way", "mm")], 4)
+    assert made.scales == {2: (0.5, 0.0)}
+    remarks = [f"begin;{k};{9 * k}" if k in (0, 5) else row for k, row in enumerate(rows)]
+    assert layout(*above[:2], *remarks).skipped == 2
+
+
+def test_units_may_stand_above_the_names_or_lack_those_of_the_last_columns() -> None:
+    rows = [f"{k};{9 * k};{k * k}" for k in range(9)]
+    for above in (("s;mm;rpm", "Time;Way;Speed"), ("Time;Way;Speed", "s;mm")):
+        made = layout(*above, *rows)
+        wanted = [("Time", "s"), ("Way", "mm"), ("Speed", "rpm" if above[0][0] == "s" else None)]
+        assert [(one.name, one.unit) for one in made.headings] == wanted
+    assert names(layout("s;V;A", *rows)) == ["s", "V", "A"]

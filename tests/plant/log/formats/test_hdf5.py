@@ -29,3 +29,31 @@ def test_numbers_that_an_hdf5_file_takes_from_other_files_or_from_itself_are_not
         file["time"] = np.arange(50.0)
     (table,) = open_hdf5(path)
     assert [one.name for one in table.headings] == ["time"]
+
+
+def test_a_frame_that_pandas_keeps_has_the_names_that_stand_beside_its_values(tmp_path: Path) -> None:
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["df/axis1"] = np.arange(50.0)
+        file["df/block0_items"] = np.array([b"position_m", b"velocity_m_s"])
+        file["df/block0_values"] = np.zeros((50, 2))
+        file["df/block1_items"] = np.array([b"one", b"two", b"three"])  # not as many as there are columns
+        file["df/block1_values"] = np.zeros((50, 2))
+        file["df/block2_items"] = h5py.ExternalLink("secret.h5", "x")
+        file["df/block2_values"] = np.zeros((50, 2))
+    (table,) = open_hdf5(path)
+    assert [one.name for one in table.headings] == [
+        *("axis1", "position_m", "velocity_m_s"),
+        *("block1_values 1", "block1_values 2", "block2_values 1", "block2_values 2"),
+    ]
+
+
+def test_fields_that_hold_several_numbers_are_columns(tmp_path: Path) -> None:
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        rows = np.zeros(50, [("index", "i8"), ("values", "f8", (2,))])
+        rows["values"][:, 1] = 7.0
+        file["table"] = rows
+    (table,) = open_hdf5(path)
+    assert [one.name for one in table.headings] == ["index", "values 1", "values 2"]
+    assert set(table.numbers()[2]) == {7.0}

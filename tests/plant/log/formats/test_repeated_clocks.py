@@ -40,3 +40,10 @@ def test_an_equal_clock_of_another_name_keeps_it(tmp_path: Path) -> None:
         "\n".join(["t,Timestamp,motor_speed_rpm,position_mm", *(f"{k},{k},{9 * k},{k}" for k in range(60))])
     )
     assert read_record(path, columns={"time_s": "Timestamp:ms"}).sample_time == pytest.approx(1e-3)
+
+
+def test_equal_columns_of_one_name_in_a_unit_of_time_are_one_clock(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", "x[s]")
+    with pytest.raises(LogError, match="column time_s is missing"):
+        read_record(path)
+    assert read_record(path, columns={"time_s": "x[s]"}).sample_time == pytest.approx(1e-3)
