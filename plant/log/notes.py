@@ -56,6 +56,7 @@ class LogCode(Code):
         "taken as evenly spaced"
     )
     TIME_IS_DATES = "column {column!r} has no unit; it was read in {unit}, so the log begins at {began}"
+    TIME_JOINED = "column {column!r} holds whole seconds; column {parts!r} was added to it as the parts of a second"
     SCALE_IN_HEADER = (
         "the file states the scale factor {factor:g} and the offset {offset:g} for column {column!r}, but not whether "
         "its values are scaled already: check them; a unit such as '{factor:g} bar' scales them"

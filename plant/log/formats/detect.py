@@ -15,6 +15,7 @@ from plant.log.formats.csv import open_csv
 from plant.log.formats.mat4_reader import is_version_4
 from plant.log.formats.packed import require_regular
 from plant.log.formats.repeated_clocks import without_repeated_clocks
+from plant.log.formats.split_seconds import with_joined_seconds
 from plant.log.table import Table
 
 SIGNS: Mapping[bytes, str] = {
@@ -162,14 +163,18 @@ def open_tables(path: Path, metadata: str | None = None) -> tuple[Table, ...]:
         if kind in REFUSED:
             raise LogError(REFUSED[kind], str(path))
         if kind == "csv":
-            return (without_repeated_clocks(_with_clear_errors(open_csv(path, metadata), kind, path)),)
+            return (_with_one_clock(_with_clear_errors(open_csv(path, metadata), kind, path)),)
         module, _, name = READERS[kind].partition(":")
         reader: Callable[[Path], Table | tuple[Table, ...]] = getattr(import_module(module), name)
         made = reader(path)
         opened = made if isinstance(made, tuple) else (made,)
-        return tuple(without_repeated_clocks(_with_clear_errors(one, kind, path)) for one in opened)
+        return tuple(_with_one_clock(_with_clear_errors(one, kind, path)) for one in opened)
     except BaseException as error:
         raise refusal(error, kind, path) from error
+
+
+def _with_one_clock(table: Table) -> Table:
+    return without_repeated_clocks(with_joined_seconds(table))
 
 
 def _with_clear_errors(table: Table, kind: str, path: Path) -> Table:
