@@ -7,6 +7,7 @@ from difflib import SequenceMatcher
 from functools import cached_property
 
 from plant.unit_text import plain_unit
+from plant.units import converts
 
 _BRACKETED = re.compile(r"^(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]{0,40})\]|\((?P<round>[^()]{0,40})\))$")
 _UNIT_AFTER_NAME = re.compile(r"^(?P<name>.*\S)(?:\s+/\s*|\s*,\s+|\s+in\s+)(?P<unit>\S{1,20})$")
@@ -143,6 +144,22 @@ def is_unit_row(row: Sequence[str]) -> bool:
     """
     cells = [_UNIT_LABEL.sub("", cell) for cell in (row[1:] if _UNITS_FOLLOW.fullmatch("".join(row[:1])) else row)]
     return any(map(is_unit, cells)) and all(unit_or_none(cell) is None or is_unit(cell) for cell in cells)
+
+
+def begins_with_time(cells: Sequence[str]) -> bool:
+    """Return whether cells are units of which the first is that of a time, so that none in front of it is lacking.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of a row.
+
+    Examples
+    --------
+    >>> begins_with_time(["s", "mm"]), begins_with_time(["mm", "s"])
+    (True, False)
+    """
+    return is_unit_row(cells) and converts(cells[0].strip("[]()"), "s")
 
 
 def names_and_units(above: Sequence[list[str]], width: int) -> tuple[list[str], list[str | None]]:

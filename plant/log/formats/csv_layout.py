@@ -24,8 +24,9 @@ from plant.log.formats.cell_texts import (
 from plant.log.formats.csv_loggers import LOGGERS, Text, stated_scales, without_remarks
 from plant.log.formats.layouts_seen import remember_layout, remembered_layout
 from plant.log.formats.packed import open_unpacked
+from plant.log.formats.quoted_header import with_quoted_header
 from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
-from plant.log.headings import Heading, is_unit_row, names_and_units
+from plant.log.headings import Heading, begins_with_time, is_unit_row, names_and_units
 
 INSPECTED_BYTES = 1 << 18
 """Bytes of a log that are looked at to tell how it is written."""
@@ -122,6 +123,7 @@ def layout_of(path: Path) -> Layout:
     if len(start) == INSPECTED_BYTES and len(lines) < LINES:
         lines = lines[:-1] or lines  # the last line is incomplete
     layout = layout_of_lines(lines, encoding, str(path))
+    layout = with_quoted_header(layout, lines, lambda some: layout_of_lines(some, encoding, str(path)))
     remember_layout(start, LINES, layout)
     return layout
 
@@ -339,10 +341,9 @@ def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bo
         cells = [cell.strip().removeprefix("\ufeff") for cell in cells_of(plain, delimiter)]
         if delimiter == BLANKS and len(cells) != width:
             cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]
-        if (closed and len(cells) == width - 1) or (1 < len(cells) < width and is_unit_row(cells)):
+        if (closed and len(cells) == width - 1) or (1 < len(cells) < width and begins_with_time(cells)):
             cells += [""] * (width - len(cells))
-        if len(cells) == width + 1 and not cells[-1]:
-            del cells[-1]
+        cells = cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
         if len(cells) != width or not any(cells):
             break
         found.insert(0, cells)

@@ -275,3 +275,6 @@ def test_units_may_stand_above_the_names_or_lack_those_of_the_last_columns() -> 
         wanted = [("Time", "s"), ("Way", "mm"), ("Speed", "rpm" if above[0][0] == "s" else None)]
         assert [(one.name, one.unit) for one in made.headings] == wanted
     assert names(layout("s;V;A", *rows)) == ["s", "V", "A"]
+    assert [one.unit for one in layout("Time;Way;Speed", "mm;rpm", *rows).headings] == [
+        None
+    ] * 3  # not those of the first
