@@ -30,8 +30,7 @@ class SensorCode(Code):
         "jumps; the repeated rows were left out"
     )
     SENT_TWICE = (
-        "the logger wrote {rows} rows a second time, under later times (places in the log: {count}); the copies were "
-        "left out"
+        "the logger wrote {rows} rows a second time, under later times (places: {count}); the copies were left out"
     )
     HELD_ALONE = (
         "{channel} repeats its last value for {seconds:.3g} s in all while other channels go on (places: {count}, the "
@@ -131,6 +130,7 @@ class EstimateCode(Code):
         "the flow balance leaves something out: what it misses of the pressure is more than noise (correlation of "
         "successive residuals {correlation:.2f}, noise alone: 0)"
     )
+    PRESSURE_SMOOTHED = "{channel} was smoothed (filtfilt, low-pass): without its noise, no fit can be checked"
     SEARCH_ENDED = "the search for what explains the log became too long and was ended: use a shorter part of the log"
     CHANNEL_LATE = (
         "{channel} is {milliseconds:.1f} ms too {when} for the flow balance: a sensor or its filter lags, and this was "

@@ -188,6 +188,10 @@ class AdviceCode(Code):
         "else correct chamber_volume from {written:.3g} to {volume:.3g} m^3; then diagnose this log again"
     )
     FIT_DOUBTED = "the model does not follow this log: check units, signs and the rig file first"
+    LOG_UNFILTERED = (
+        "log {channel} as its sensor gives it, without a filter in logger or script (filtfilt, low-pass, spline), then "
+        "diagnose again; so far the log neither confirms nor refutes a class"
+    )
     LOG_PRESSURE = "log differential pressure: leakage and friction are then known several times better"
     MOVE_PISTON = "use steps that move the piston: this log cannot show friction"
     MORE_SPEEDS = (

@@ -13,6 +13,7 @@ from estimation.eha.foreign_oil import no_motion_notes, rejected_if_foreign_oil
 from estimation.eha.named_methods import NAMED
 from estimation.eha.result import LARGEST_BOUND, BulkModulusEstimate, is_vague, wide_bound_note, without_number
 from estimation.eha.rig_share import fitted_responses, scaled_responses, with_wear
+from estimation.eha.smoothed_pressure import told_if_smoothed
 from estimation.filters.run import available_channels
 from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import REPORTED, fit_flow
@@ -201,7 +202,9 @@ def estimate_clean(
         found = _fitted_estimate(fit, form, FITTED[form][1])
         found = replace(found, responses=fitted_responses(fit)) if form == "flow" else found
     found = rejected_if_another_rig(_with_rig_uncertainty(found, parameters, spreads), log, parameters)
-    return _gated_by_sensors(rejected_if_foreign_oil(found, log.record, parameters) if form == "flow" else found, log)
+    if form == "flow":
+        found = told_if_smoothed(rejected_if_foreign_oil(found, log.record, parameters), log.record)
+    return _gated_by_sensors(found, log)
 
 
 def _fit(
@@ -216,7 +219,7 @@ def _fit(
     require_flow_channels(log.record)
     doubted, record = {name: max(one) for name, one in spreads.items()}, log.record
     loaded = not chosen and first_load(record, log.variances) != 0.0
-    traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held)
+    traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held, log.averaged)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
     ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
     plain = not fit.reasons  # explained down to the noise: a load that leaks off at once leaves no trace
@@ -341,5 +344,6 @@ def _fitted_estimate(fit: FormFit, form: str, channels: tuple[str, ...]) -> Bulk
         explanation=fit.explanation,
         remarks=fit.remarks,
         turning=fit.turning,
+        mean_late=fit.mean_late,
         correlation=fit.correlation,
     )

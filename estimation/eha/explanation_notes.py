@@ -240,6 +240,21 @@ _NOTES: Mapping[str, Callable[[Explanation, EhaParameters], Note]] = {
 }
 
 
+def log_with_means_in_time(log: CleanLog, late: float) -> CleanLog:
+    """Return a log whose averaged pressures are in the middle of their rows.
+
+    Parameters
+    ----------
+    late : float
+        How late they are logged [s].
+    """
+    return (
+        replace(log, record=log.record.replace(**{PRESSURE: _without_delay(log.record, PRESSURE, late)}))
+        if late
+        else log
+    )
+
+
 def log_at_pump_speed(log: CleanLog, turning: Turning) -> CleanLog:
     """Return a log with the speed at which a pump without ripple delivers the same flow.
 

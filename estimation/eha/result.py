@@ -68,6 +68,8 @@ class BulkModulusEstimate:
         `estimation.eha.named_methods.NAMED`.
     turning : Turning
         Pump ripple and offset of the speed that were corrected.
+    mean_late : float
+        How late an averaged pressure is logged after the middle of its rows [s].
     correlation : float
         Correlation of the errors of leakage coefficient and flow bias, if a fit balances flows [dimensionless].
     """
@@ -90,6 +92,7 @@ class BulkModulusEstimate:
     remarks: tuple[Note, ...] = ()
     method: str = "least-squares"
     turning: Turning = NO_RIPPLE
+    mean_late: float = 0.0
     correlation: float = 0.0
 
     @property

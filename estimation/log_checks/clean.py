@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from estimation.log_checks.averaged import averaged_rows, without_overlapping_means
 from estimation.log_checks.channel_names import MEASURED, POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.discontinuities import without_discontinuities
@@ -15,6 +16,7 @@ from estimation.log_checks.hum import without_hum
 from estimation.log_checks.late_velocity import without_late_velocity
 from estimation.log_checks.logged_on_change import logged_on_change
 from estimation.log_checks.measurement_noise import SMALLEST_VARIANCE, measurement_variances, rounded_variance
+from estimation.log_checks.notes import LoggerCode
 from estimation.log_checks.outliers import without_gross_outliers
 from estimation.log_checks.position_range import without_position_beyond_range
 from estimation.log_checks.sample_time import require_fast_enough
@@ -62,6 +64,11 @@ class CleanLog:
     def filtered(self) -> bool:
         """Whether a pressure was filtered before it was logged."""
         return any(note.code == SensorCode.FILTERED for note in self.left_out)
+
+    @property
+    def averaged(self) -> int:
+        """Rows of which each pressure is the mean, 1 if it was not averaged."""
+        return next((int(str(one.data["rows"])) for one in self.left_out if one.code == LoggerCode.AVERAGED), 1)
 
     @property
     def speed_held(self) -> bool:
@@ -119,7 +126,9 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         objections = steps = ()
     if VELOCITY in accused:  # the offset of a dead sensor says nothing
         offset = ()
-    every, (sound, filtered) = sound, without_correlated_noise(sound, natural_frequency(parameters))
+    every, (sound, filtered) = sound, without_overlapping_means(sound)
+    if not filtered:
+        sound, filtered = without_correlated_noise(sound, natural_frequency(parameters))
     as_logged = (*digits, *held, *twice, *dropouts, *alone)
     left_out = (*as_logged, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
     variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered, every)}
@@ -128,7 +137,9 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
 
 def _thinned_variances(record: Record, filtered: tuple[Note, ...], every: Record) -> Mapping[str, float]:
     """Return the variances of channels of which one sample in several was kept; rounding is determined from all."""
-    found = {name: independent_variance(record[name]) for name in (str(note.data["channel"]) for note in filtered)}
+    found = {str(note.data["channel"]): independent_variance(record[str(note.data["channel"])]) for note in filtered}
+    means = [str(note.data["channel"]) for note in filtered if note.code == LoggerCode.AVERAGED]
+    found |= {name: variance / rows for name in means for rows, variance in (averaged_rows(every[name]),)}
     rounded = {name: rounded_variance(every[name]) for name in found}
     least = SMALLEST_VARIANCE[PRESSURE]
     return {name: max(one, least, rounded[name]) for name, one in found.items() if one is not None}

@@ -16,8 +16,6 @@ from plant.notes import Note
 WINDOW = 64
 """Samples of a window of the spectrum [count]."""
 
-_TAPER = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(WINDOW) / WINDOW)
-
 FEWEST_WINDOWS = 8
 """Least number of windows without a missing sample for a spectrum [count]."""
 
@@ -44,6 +42,11 @@ NEARER = 0.5
 """Largest distance from white noise in quiet windows, over that in all [dimensionless]; judged. Selection by power
 favours white noise: of 60 logs with averages of 2 or 4 rows at most one passes, of 60 with a correlation of 0.15 or a
 filter at 0.3 cycles/sample at most 10."""
+
+SMOOTH, LAST = 5e-3, 4
+"""Power of the last bins of the spectrum over that from 0.3 cycles/sample on, below which a filter has left no noise
+[fraction], and those bins [count]; judged. White noise has 1, its mean over two rows 0.04, over more rows more; a
+filter of second order, forward and backward, has 2e-3 or less up to 0.4 cycles/sample."""
 
 MOST_ROWS = 40
 """Rows over which noise may be correlated [count]."""
@@ -116,8 +119,31 @@ def is_white(values: Array) -> bool:
     values : ndarray, shape (n,)
         The channel [any unit]; NaN where missing.
     """
-    windows = _windows(values)
+    windows = windows_of(values)
     return len(windows) < FEWEST_WINDOWS or flatness(windows) > _least_white_flatness(len(windows))
+
+
+def is_smoothed(values: Array) -> bool:
+    """Return whether a channel has no noise at the highest frequencies, as behind a filter, or simulated without any.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Differential pressure [Pa]; NaN where missing.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(0.0, 1e3, 20_000)
+    >>> smooth = np.convolve(noise, np.hanning(32) / 16.0, "valid")
+    >>> is_smoothed(noise), is_smoothed(smooth)
+    (False, True)
+    """
+    windows = windows_of(values)
+    if len(windows) < FEWEST_WINDOWS:
+        return False
+    power = np.sort(spectra(windows), axis=0)[len(windows) // 2]
+    last, upper = float(np.mean(power[-LAST:])), float(np.mean(power[round(BANDS[1] * WINDOW) :]))
+    return last < SMOOTH * upper or (independent_variance(values) or np.inf) <= SMALLEST_VARIANCE[PRESSURE]
 
 
 def is_white_when_quiet(values: Array) -> bool:
@@ -132,10 +158,10 @@ def is_white_when_quiet(values: Array) -> bool:
     values : ndarray, shape (n,)
         The channel [any unit]; NaN where missing.
     """
-    windows = _windows(values)
+    windows = windows_of(values)
     if len(windows) * QUIET < FEWEST_WINDOWS:
         return False
-    loud = np.sum(_spectra(windows)[:, np.arange(WINDOW // 2 + 1) >= BANDS[0] * WINDOW], axis=1)
+    loud = np.sum(spectra(windows)[:, np.arange(WINDOW // 2 + 1) >= BANDS[0] * WINDOW], axis=1)
     quiet = windows[loud <= np.sort(loud)[int(QUIET * (len(loud) - 1))]]  # np.quantile imports numpy.ma
     found = flatness(quiet)
     return found > _least_white_flatness(len(quiet)) and 1.0 - found < NEARER * (1.0 - flatness(windows))
@@ -146,16 +172,24 @@ def _least_white_flatness(windows: int) -> float:
     return min(FLATTEST, 1.0 - CHANCE / windows**0.5)
 
 
-def _overlapping_windows(values: Array) -> Array:
-    """Return windows that overlap by half, shape (windows, `WINDOW`)."""
-    if len(values) < WINDOW:
-        return np.empty((0, WINDOW))
-    return np.lib.stride_tricks.sliding_window_view(values, WINDOW)[:: WINDOW // 2]
+def windows_of(values: Array, length: int = WINDOW) -> Array:
+    """Return windows without missing samples that overlap by half.
 
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A channel [any unit]; NaN where missing.
+    length : int
+        Samples of a window [count].
 
-def _windows(values: Array) -> Array:
-    """Return windows without missing samples, shape (windows, `WINDOW`)."""
-    windows = _overlapping_windows(values)
+    Returns
+    -------
+    ndarray, shape (windows, length)
+        The windows.
+    """
+    if len(values) < length:
+        return np.empty((0, length))
+    windows = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
     return windows[np.isfinite(windows).all(axis=1)]
 
 
@@ -198,24 +232,51 @@ def independent_variance(values: Array) -> float | None:
     >>> round(independent_variance(np.random.default_rng(1).normal(0.0, 3.0, 20_000)) or 0.0)
     9
     """
-    windows = _windows(values[np.isfinite(values)])
+    windows = windows_of(values[np.isfinite(values)])
     if len(windows) < FEWEST_WINDOWS:
         return None
     # a spectrum's power is exponentially distributed, so its median is its mean times log 2
-    return _powers(windows)[-1] / float(np.log(2.0) * np.sum(_TAPER**2))
+    return _powers(windows)[-1] / float(np.log(2.0) * np.sum(taper_of(WINDOW) ** 2))
 
 
-def _spectra(windows: Array) -> Array:
-    """Return the power of windows without their straight lines, shape (windows, `WINDOW` / 2 + 1) [unit squared]."""
-    line = np.linspace(-1.0, 1.0, WINDOW)
+def taper_of(length: int) -> Array:
+    """Return the taper of a window (Hann).
+
+    Parameters
+    ----------
+    length : int
+        Samples of a window [count].
+
+    Returns
+    -------
+    ndarray, shape (length,)
+        Weights [dimensionless].
+    """
+    return 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+
+
+def spectra(windows: Array) -> Array:
+    """Return the power of windows without their straight lines.
+
+    Parameters
+    ----------
+    windows : ndarray, shape (windows, length)
+        Parts of a channel [any unit].
+
+    Returns
+    -------
+    ndarray, shape (windows, length / 2 + 1)
+        Tapered by `taper_of` [unit squared].
+    """
+    line = np.linspace(-1.0, 1.0, windows.shape[1])
     level = windows - np.mean(windows, axis=1, keepdims=True)
     level -= np.outer(level @ line / (line @ line), line)
-    return np.abs(np.fft.rfft(level * _TAPER, axis=1)) ** 2
+    return np.abs(np.fft.rfft(level * taper_of(windows.shape[1]), axis=1)) ** 2
 
 
 def _powers(windows: Array) -> list[float]:
     """Return the usual power of windows in each of the bands [unit squared]."""
-    ordered = np.sort(_spectra(windows), axis=0)
+    ordered = np.sort(spectra(windows), axis=0)
     power = 0.5 * (ordered[(len(windows) - 1) // 2] + ordered[len(windows) // 2])  # np.median imports numpy.ma
     place = np.searchsorted(BANDS, np.arange(len(power)) / WINDOW, side="right")
     return [float(np.mean(power[place == band])) for band in range(1, len(BANDS))]

@@ -33,3 +33,7 @@ class LoggerCode(Code):
         "{channel} was written with {digits} significant digits: its steps grow with its size, so it was rounded to "
         "the largest step; write 7 digits or more"
     )
+    AVERAGED = (
+        "each value of {channel} is a moving average over {rows} rows ({span_ms:.3g} ms): one value in {rows} was "
+        "used, and the model was averaged alike"
+    )

@@ -208,6 +208,8 @@ def _repair_advice(doubts: list[Note], slow: Iterable[Note]) -> tuple[Note, ...]
         return (AdviceCode.CHECK_SENSOR.note(channels=" and ".join(accused)),)
     if work := tuple(one for one in map(_repair_of_fault, doubts) if one is not None):
         return work
+    if smoothed := [note.data["channel"] for note in doubts if note.code == EstimateCode.PRESSURE_SMOOTHED]:
+        return (AdviceCode.LOG_UNFILTERED.note(channel=smoothed[0]),)
     if any(note.code == EstimateCode.RIG_CONTRADICTED for note in doubts):
         return (AdviceCode.CHECK_RIG.note(),)
     if any(isinstance(note.code, EstimateCode) or note.code == AgainstCode.NONE_FITS for note in doubts):

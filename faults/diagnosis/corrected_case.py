@@ -6,7 +6,13 @@ from typing import NamedTuple
 from estimation.eha.another_rod import is_of_another_rod
 from estimation.eha.entrained_air import with_air
 from estimation.eha.estimate import explanation_and_remarks, rejection_notes
-from estimation.eha.explanation_notes import FAULTS_BEYOND_CONDITIONS, corrected_log, corrected_rig, log_at_pump_speed
+from estimation.eha.explanation_notes import (
+    FAULTS_BEYOND_CONDITIONS,
+    corrected_log,
+    corrected_rig,
+    log_at_pump_speed,
+    log_with_means_in_time,
+)
 from estimation.eha.result import BulkModulusEstimate
 from estimation.eha.rig_share import SOFT_OIL_RATIO
 from estimation.log_checks.clean import CleanLog
@@ -67,7 +73,7 @@ def corrected_case(log: CleanLog, rig: Rig, estimate: BulkModulusEstimate) -> Co
     """
     written = rig.parameters
     strange = explanation_and_remarks(estimate, written)
-    log = log_at_pump_speed(log, estimate.turning)
+    log = log_with_means_in_time(log_at_pump_speed(log, estimate.turning), estimate.mean_late)
     if estimate.explanation is not None:
         log = corrected_log(log, estimate.explanation)
         rig = replace(rig, parameters=corrected_rig(rig.parameters, estimate.explanation))

@@ -20,6 +20,7 @@ from estimation.fits.flow.belief import explanation_test, hopeless_cost, judged,
 from estimation.fits.flow.log import homed_at_stop, require_flow_channels, without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.losses import UNEVEN_OIL, with_lumped, with_lumped_slopes
+from estimation.fits.flow.mean_place import first_explained, placed_means
 from estimation.fits.flow.misread import UNLIKE_SLIPS, CorrectedLogs
 from estimation.fits.flow.model_steps import with_implicit_steps
 from estimation.fits.flow.motor_course import with_motor_course, with_open_turns
@@ -137,12 +138,13 @@ def fit_flow(
     sensed = sensed_play(record)
     if variances is None:
         record, variances = without_strays(record)
-    logged = Logged(record, variances, uncertainties or {})
-    work, corrected = Work(), CorrectedLogs(logged, parameters)
-    answer = _answer(corrected, FitStart(parameters, bulk_modulus), sensed, traits, work)
+    start = FitStart(parameters, bulk_modulus)
+    placed, unplaced = placed_means(Logged(record, variances, uncertainties or {}), start, traits.averaged)
+    work, tried = Work(), [CorrectedLogs(one, parameters) for one in placed]
+    corrected, answer = first_explained(tried, lambda one: _answer(one, start, sensed, traits, work))
     if answer.asked and answer.plain.turns_readable and not answer.ended:
-        read = replace(answer.plain.start, turns_read=True)
-        answer = agreed_answer(answer, _answer(corrected, read, sensed, traits, work))
+        start = replace(answer.plain.start, turns_read=True)
+        answer = agreed_answer(answer, _answer(corrected, start, sensed, traits, work))
     plain, asked, open_ends, strange, ended = answer
     slip = loss = None
     try:
@@ -160,6 +162,8 @@ def fit_flow(
         fit = _explained_fit(plain, strange, sensed, traits)
     else:
         fit = _plain_fit(plain, sensed, (*open_ends, *shut_valves(plain, traits)), begun=BEGUN_UNDER_LOAD in asked)
+    late = corrected.logged.mean.late_rows * record.sample_time
+    fit = replace(fit, mean_late=late, parameters=with_structure(fit.parameters, unplaced))
     return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.fits.flow.accumulator import GAS, presumed_stiffness
+from estimation.fits.flow.mean_rows import NO_MEAN, PressureMean
 from estimation.fits.flow.pumped import with_pump_correction
 from estimation.fits.greybox.block_averages import averaged_log, odd_block
 from estimation.fits.greybox.intersample_doubt import OWN_NOISE, SLOW
@@ -142,6 +143,7 @@ def flow_log(
     variances: Mapping[str, float],
     *,
     held: bool = False,
+    mean: PressureMean = NO_MEAN,
 ) -> GreyBoxLog:
     """Return a log for the flow form.
 
@@ -159,24 +161,29 @@ def flow_log(
         Of the noise of the channels [SI squared].
     held : bool
         Whether the motor's course bends at the samples, see `estimation.fits.flow.motor_course`.
+    mean : PressureMean
+        Rows that each pressure is the mean of.
 
     Returns
     -------
     GreyBoxLog
         Averaged if it is faster than the form needs.
     """
-    sensed, record = record, without_pauses(record)
+    sensed = mean.begun(record)
+    record = without_pauses(sensed)
     # motor speed keeps its larger variance, with sudden changes, so that intervals cover its course
     pressure = "differential_pressure_pa"
     quiet = {pressure: noise_behind_motion(sensed[pressure], variances[pressure])}
-    log = greybox_log(
-        FLOW_FORM,
-        record,
-        flow_parameters(parameters),
-        longest_step=LONGEST_STEP,
-        variances={**variances, **quiet},
-        # the accumulator's stiffness is fitted
-        uncertainties={name: one for name, one in uncertainties.items() if name != GAS},
+    log = mean.spread(
+        greybox_log(
+            FLOW_FORM,
+            record,
+            flow_parameters(parameters),
+            longest_step=LONGEST_STEP,
+            variances={**variances, **quiet},
+            # the accumulator's stiffness is fitted
+            uncertainties={name: one for name, one in uncertainties.items() if name != GAS},
+        )
     )
     speed, position = (FLOW_FORM.drives.index(name) for name in ("motor_speed_rad_s", "position_m"))
     drives = log.drives.copy()
@@ -202,9 +209,13 @@ def flow_log(
         },
         within=WITHIN,
     )
-    log = with_pump_correction(averaged_log(log, LONGEST_STEP, _samples_per_block(log, parameters)), log, parameters)
+    log = with_pump_correction(
+        averaged_log(log, LONGEST_STEP, mean.block_of(log, _samples_per_block(log, parameters))), log, parameters
+    )
     felt = log.noise[0].passed_on * parameters.bulk_modulus > FELT_NOISE * log.noise[0].variance ** 0.5
-    return _with_leaking_noise(log, parameters, record) if felt else log.with_noise_at(parameters.bulk_modulus)
+    return mean.judged(
+        _with_leaking_noise(log, parameters, record) if felt else log.with_noise_at(parameters.bulk_modulus)
+    )
 
 
 def _with_leaking_noise(log: GreyBoxLog, p: EhaParameters, record: Record) -> GreyBoxLog:

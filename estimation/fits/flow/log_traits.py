@@ -18,12 +18,15 @@ class LogTraits:
     speed_held : bool
         Whether motor speed was logged at a lower rate than the rest. If the plain form does not explain such a log, the
         course of the speed is the likely cause, and no hypotheses are tested.
+    averaged : int
+        Rows of which each pressure is the mean, 1 if it was not averaged [count].
     """
 
     loaded: bool = False
     moving: bool = False
     filtered: bool = False
     speed_held: bool = False
+    averaged: int = 1
 
 
 AT_REST = LogTraits()

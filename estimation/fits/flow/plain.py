@@ -5,9 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from operator import attrgetter
 
-import numpy as np
-
 from estimation.fits.flow.log import STIFFEST_OIL, flow_log
+from estimation.fits.flow.mean_rows import NO_MEAN, PressureMean
 from estimation.fits.flow.search import balance_fits, flow_starts, likeliest_swinging, refitted_balances
 from estimation.fits.flow.swept import with_first_fit
 from estimation.fits.flow.turns_read import with_turns_read
@@ -53,15 +52,18 @@ class Logged:
         Measurement variance of each [SI squared].
     uncertainties : Mapping[str, float]
         Relative standard deviation of the actuator's parameters [fraction].
+    mean : PressureMean
+        Rows that each pressure is the mean of.
     """
 
     record: Record
     variances: Mapping[str, float]
     uncertainties: Mapping[str, float] = field(default_factory=dict[str, float])
+    mean: PressureMean = NO_MEAN
 
     def as_flow_log(self, parameters: EhaParameters, *, held: bool = False) -> GreyBoxLog:
         """Return the log as the flow form sees it for an actuator, whose motor command may be ``held``."""
-        return flow_log(self.record, parameters, self.uncertainties, self.variances, held=held)
+        return flow_log(self.record, parameters, self.uncertainties, self.variances, held=held, mean=self.mean)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +209,7 @@ def plain_fits(logged: Logged, start: FitStart, near: Sequence[GreyBoxFit] = ())
     log = replace(log, stiff=start.implicit)
     starts = flow_starts(parameters, max(start.bulk_modulus, LEAST_GUESS * parameters.bulk_modulus))
     explains = partial(fit_explains, noisy=log.passes_on)
-    largest, _ = residual_limits(log.passes_on, int(np.count_nonzero(np.isfinite(log.measured[:, 0]))))
+    largest, _ = residual_limits(log.passes_on, log.count_measured)
     fitted = partial(balance_fits, parameters=parameters, starts=starts, valley=start.valley, stiffest=start.stiffest)
     led = partial(refitted_balances, parameters=parameters, fits=near, stiffest=start.stiffest) if near else fitted
     unturned = with_course(log, led, parameters, always=start.turns_open)

@@ -1,6 +1,7 @@
 """Slips in how a log's channels were read, one or two at a time, and a log with them corrected."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -122,4 +123,4 @@ def with_slips_corrected(slips: Sequence[Slip], logged: Logged) -> Logged | None
             return None
         variances[slip.channel] = noise
         record = record.replace(**{slip.channel: times * logged.record[source]})
-    return Logged(record, variances, logged.uncertainties)
+    return replace(logged, record=record, variances=variances)

@@ -122,4 +122,5 @@ def averaged_log(log: GreyBoxLog, longest_step: float, block: int | None = None)
         steps=np.full(len(outputs) + 1, steps_a_sample(sample_time, longest_step)),
         noise=tuple(noise.scaled(1.0 / block) for noise in log.noise),
         drive_std=tuple(spread / block**0.5 for spread in log.drive_std),
+        mean_rows=1 if block == log.mean_rows else log.mean_rows,
     )

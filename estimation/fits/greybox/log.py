@@ -143,6 +143,8 @@ class GreyBoxLog:
         Number of residuals of a longer log that each one represents, in `FreedProblem` [count].
     stiff : bool
         Whether model steps are implicit, since an open valve fills a chamber within one step.
+    mean_rows : int
+        Rows of which each measured value is the mean; they all have it, and `block` holds whole means.
     sampled : tuple of (ndarray, shape (samples,), and float), optional
         Motor speed of an averaged log before it was averaged, and its sample time [rad/s, s].
     """
@@ -166,6 +168,7 @@ class GreyBoxLog:
     course: "IntersampleDoubt | None" = None
     stands_for: float = 1.0
     stiff: bool = False
+    mean_rows: int = 1
     sampled: tuple[Array, float] | None = None
 
     def beginning(self, samples: int) -> "GreyBoxLog":
@@ -212,6 +215,11 @@ class GreyBoxLog:
     def passes_on(self) -> bool:
         """Whether noise of a driving channel matters, multiplied by an unknown."""
         return any(noise.passed_on > 0.0 for noise in self.noise)
+
+    @property
+    def count_measured(self) -> int:
+        """Number of measured values of the first output [count]."""
+        return int(np.count_nonzero(np.isfinite(self.measured[:, 0]))) // self.mean_rows
 
     @property
     def measured_rms(self) -> float:

@@ -65,7 +65,7 @@ def decimated(log: GreyBoxLog, every: int) -> GreyBoxLog:
     every : int
         How many samples are merged into one [count].
     """
-    if every < 2:
+    if every < 2 or log.mean_rows > 1:
         return log.coarsened()
     block = min(max(1, round(log.block / log.sample_time)), every)
     there = np.flatnonzero(np.isfinite(log.measured[:, 0]))

@@ -49,6 +49,8 @@ class FormFit:
         What the log leaves undecided, which is no objection to the fit.
     turning : Turning
         Pump ripple and speed offset that were corrected.
+    mean_late : float
+        How late an averaged pressure is logged after the middle of its rows [s].
     correlation : float
         Of the errors of leakage coefficient and flow bias [dimensionless].
     """
@@ -61,6 +63,7 @@ class FormFit:
     explanation: "Explanation | None" = None
     remarks: tuple[Note, ...] = ()
     turning: Turning = NO_RIPPLE
+    mean_late: float = 0.0
     correlation: float = 0.0
 
 

@@ -180,6 +180,9 @@ def without_delays(log: GreyBoxLog, delays: Mapping[str, float]) -> GreyBoxLog:
             else:
                 drives[-samples:, columns] = log.drives[:samples, columns]
             measured[late] = np.nan
+        elif log.mean_rows > 1:  # whole means stay in their rows
+            drives = np.pad(drives, ((max(samples, 0), max(-samples, 0)), (0, 0)), mode="edge")
+            drives = drives[: len(measured)] if samples > 0 else drives[-samples:]
         else:
             measured = np.vstack([measured[samples:], np.full_like(measured[late], np.nan)])
     return replace(log, measured=measured, drives=drives)

@@ -23,6 +23,7 @@ from plant.notes import Note
 RESIDUAL_REASONS = {
     EstimateCode.PRESSURE_RESIDUALS_LARGE,
     EstimateCode.PRESSURE_RESIDUALS_CORRELATED,
+    EstimateCode.PRESSURE_SMOOTHED,
     EstimateCode.CHANNEL_LATE,
     EstimateCode.TEETH_LEFT,
     EstimateCode.INNOVATIONS_LARGE,

@@ -12,6 +12,7 @@ from estimation.log_checks.filtered import (
     is_white_when_quiet,
     without_correlated_noise,
 )
+from estimation.log_checks.notes import LoggerCode
 from estimation.notes import SensorCode
 from faults.conditions import CONDITIONS, parameters_for
 from plant.arrays import Array
@@ -158,7 +159,7 @@ def test_a_linear_trend_in_a_window_does_not_change_its_flatness() -> None:
 def test_a_cleaned_log_with_averaged_pressure_has_the_reduced_variance() -> None:
     record = log("steps")
     clean = clean_log(record.replace(**{PRESSURE: averaged(record[PRESSURE], 4)}), EhaParameters())
-    assert [note.code for note in clean.left_out] == [SensorCode.FILTERED]
+    assert [note.code for note in clean.left_out] == [LoggerCode.AVERAGED]
     # an average of four has half the noise
     white = clean_log(record, EhaParameters()).variances[PRESSURE]
     assert clean.variances[PRESSURE] == pytest.approx(white / 4.0, rel=0.25)
