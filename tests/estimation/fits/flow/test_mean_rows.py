@@ -1,12 +1,14 @@
 """An averaged pressure gives the numbers of the raw one, since the model is averaged over the same rows."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimation.eha.bulk_modulus import BulkModulusEstimate, estimate_bulk_modulus
 from estimation.eha.smoothed_pressure import told_if_smoothed
+from estimation.finding import Gate
 from estimation.fits.flow.mean_rows import NO_MEAN, PressureMean
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.log_checks.channel_names import PRESSURE
@@ -87,9 +89,10 @@ def test_a_fit_that_is_refused_behind_a_zero_phase_filter_names_the_filter_first
 
     record = log("steps")
     smooth = record.replace(**{PRESSURE: filtfilt(*butter(2, 0.1), record[PRESSURE])})
-    found = estimate_bulk_modulus(smooth, RIG)
-    assert [note.code for note in found.gate.reasons][:2] == [
-        EstimateCode.PRESSURE_SMOOTHED,
-        EstimateCode.PRESSURE_RESIDUALS_LARGE,
-    ]
-    assert told_if_smoothed(found, record) is found
+    sound = estimate_bulk_modulus(record, RIG)
+    large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=9.0)
+    refused = replace(sound, gate=Gate(False, (large,)))
+    named = told_if_smoothed(refused, smooth)
+    assert [note.code for note in named.gate.reasons] == [EstimateCode.PRESSURE_SMOOTHED, large.code]
+    assert told_if_smoothed(refused, record) is refused
+    assert told_if_smoothed(sound, smooth) is sound
