@@ -128,6 +128,8 @@ def _hindrance(result: Mapping[str, Any]) -> str:
     codes = {one["code"] for one in result["notes"]}
     if AgainstCode.STUCK_OR_LEAKS in codes:
         return "the piston stands still, and without pressure the log does not tell why"
+    if EstimateCode.PRESSURE_SMOOTHED in codes:
+        return "the pressure was smoothed, so that no fit can be checked"
     if EstimateCode.RIG_CONTRADICTED in codes:
         return "the log and the rig file contradict each other"
     return "the log does not fit any known condition of this actuator"

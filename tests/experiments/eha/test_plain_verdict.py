@@ -58,6 +58,7 @@ def test_the_verdict_on_every_condition_names_its_faults(condition: str) -> None
         (SensorCode.SENSOR_CONSTANT.note(channel="b", value=1e5), "the sensor of b reads wrong."),
         (AgainstCode.STUCK_OR_LEAKS.note(moved_m=1e-5, pumped_m=0.04), "the log does not tell why."),
         (EstimateCode.RIG_CONTRADICTED.note(percent=129.0), "the log and the rig file contradict each other."),
+        (EstimateCode.PRESSURE_SMOOTHED.note(channel="c"), "smoothed, so that no fit can be checked."),
         (AgainstCode.OIL_STIFF.note(share=2.0), "the log does not fit any known condition of this actuator."),
     ],
 )

@@ -162,6 +162,9 @@ def test_advice_on_an_objection_replaces_all_other_advice() -> None:
     assert codes(advice_for(record, UNSURE, (AgainstCode.OIL_SOFT.note(share=0.4),), (), ALL)) == [AdviceCode.CHECK_RIG]
     contradicted = EstimateCode.RIG_CONTRADICTED.note(percent=200.0)
     assert codes(advice_for(record, UNSURE, (contradicted, residuals), (), ALL)) == [AdviceCode.CHECK_RIG]
+    smoothed = EstimateCode.PRESSURE_SMOOTHED.note(channel="c")  # its fit contradicts no rig file
+    (said,) = advice_for(record, UNSURE, (smoothed, contradicted, residuals), (), ALL)
+    assert said == AdviceCode.LOG_UNFILTERED.note(channel="c")
 
 
 def test_faster_sampling_is_advised_for_an_unsure_log_at_100_hz_or_less() -> None:
