@@ -28,7 +28,7 @@ def alike(correlation: float, count: int) -> Array:
 @NUMBERS.case()
 def noise_that_was_filtered() -> dict[str, Any]:
     rows = filtered.independent_rows
-    windows = filtered._windows(alike(0.4, 2000))  # pyright: ignore[reportPrivateUsage]
+    windows = filtered.windows_of(alike(0.4, 2000))
     straight = np.linspace(-40.0, 60.0, filtered.WINDOW)
     holed = averaged(4, 4000)
     holed[[700, 701, 2000]] = np.nan
@@ -40,8 +40,7 @@ def noise_that_was_filtered() -> dict[str, Any]:
         "beside a straight line": filtered._powers(windows + straight),  # pyright: ignore[reportPrivateUsage]
         "flatness": [filtered.flatness(one) for one in (windows, 0.0 * windows, windows[:1])],
         "windows": [
-            len(filtered._windows(values))  # pyright: ignore[reportPrivateUsage]
-            for values in (holed, holed[:63], holed[:64], holed[:95], holed[:96])
+            len(filtered.windows_of(values)) for values in (holed, holed[:63], holed[:64], holed[:95], holed[:96])
         ],
         "white up to a correlation of": [
             edge(lambda one, count=count: filtered.is_white(alike(one, count)), 0.0, 0.9, 16)
