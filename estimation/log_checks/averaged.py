@@ -29,8 +29,8 @@ MOST_LEFT, CHANCE = 0.1, 2.2
 second over the root of the number of windows more [dimensionless]. The right count left 0.08 to 0.19 (decision 454)."""
 
 DISTINCT = 2.5
-"""How much more any other count must leave [dimensionless]. The next best left 1.4 or more where the right one left 0.19
-at most (decision 454)."""
+"""How much more any other count must leave [dimensionless]. The next best left at least 1.4 where the right one left
+0.19 at most (decision 454)."""
 
 
 def without_overlapping_means(record: Record) -> tuple[Record, tuple[Note, ...]]:
