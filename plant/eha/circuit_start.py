@@ -1,16 +1,12 @@
 """Initial states of the circuit: at rest, or under the pressure at the start of a log."""
 
 from plant.compiled.functions import Scalar, maximum, minimum, where
-from plant.components.oil import ATMOSPHERE, specific_volume
+from plant.components.oil import specific_volume
 from plant.eha.circuit import CircuitState, CircuitValues, chamber_volumes
-from plant.eha.model import piston_areas
 
 
 def at_rest(p: CircuitValues) -> CircuitState:
     """Return the state at rest in mid-stroke: both chambers at the accumulator's pressure, or one higher under a load.
-
-    The accumulator's pressure pushes a single rod out. Friction holds against it as far as it can, a higher pressure
-    on one side against the rest and the load.
 
     Parameters
     ----------
@@ -22,16 +18,7 @@ def at_rest(p: CircuitValues) -> CircuitState:
     tuple of float
         As named in `STATES`.
     """
-    pushed = _push_of_supply(p)
-    held = p.load_force - pushed + maximum(minimum(pushed, p.friction_coulomb), -p.friction_coulomb)
-    area_a, area_b = piston_areas(p)
-    return under_pressure(held / where(held > 0.0, area_a, area_b), 0.0, p)
-
-
-def _push_of_supply(p: CircuitValues) -> Scalar:
-    """Return the force on the piston with both chambers at the accumulator's pressure [N]."""
-    area_a, area_b = piston_areas(p)
-    return (area_a - area_b) * (p.accumulator_pressure - ATMOSPHERE)
+    return under_pressure(p.load_force / p.piston_area, 0.0, p)
 
 
 def under_pressure(pressure: Scalar, velocity: Scalar, p: CircuitValues) -> CircuitState:
@@ -53,8 +40,7 @@ def under_pressure(pressure: Scalar, velocity: Scalar, p: CircuitValues) -> Circ
     tuple of float
         As named in `STATES`.
     """
-    area_a, area_b = piston_areas(p)
-    push = where(pressure > 0.0, area_a, area_b) * pressure + _push_of_supply(p) - p.load_force
+    push = p.piston_area * pressure - p.load_force
     bristle = maximum(minimum(push / where(p.friction_coulomb > 0.0, p.friction_coulomb, 1.0), 1.0), -1.0)
     filled_a, filled_b = (
         volume / specific_volume(p.accumulator_pressure + more, p.bulk_modulus, p.air_fraction, p.vapour_pressure)

@@ -104,15 +104,3 @@ def test_a_chamber_or_accumulator_without_oil_is_a_breach() -> None:
     chamber, accumulator = circuit_breaches(states).values()
     assert chamber.tolist() == [False, True, False]
     assert accumulator.tolist() == [False, False, True]
-
-
-@pytest.mark.parametrize("load", [0.0, 3000.0, -3000.0])
-@pytest.mark.parametrize("coulomb", [436.0, 20.0])
-@pytest.mark.parametrize("share", [0.1765, -0.35])
-def test_a_single_rod_rests_until_its_motor_turns(share: float, coulomb: float, load: float) -> None:
-    tight = dict.fromkeys(("leakage_coefficient", "pump_crossport_leakage", "pump_case_leakage"), 0.0)
-    p = replace(RIG, area_difference=share, load_force=load, friction_coulomb=coulomb, **tight)
-    record = simulate(CIRCUIT, np.zeros(200), 1e-3, p)
-    assert np.max(np.abs(record["position_m"])) < 1e-9
-    assert np.ptp(record["pressure_a_pa"]) < 10.0
-    assert np.ptp(record["pressure_b_pa"]) < 10.0
