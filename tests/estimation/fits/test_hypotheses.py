@@ -139,7 +139,7 @@ def test_a_drifting_pressure_offset_is_identified_and_subtracted() -> None:
 def test_a_pressure_that_reads_a_bar_too_high_is_an_offset_and_not_an_initial_load() -> None:
     record = log()
     off = record.replace(**{PRESSURE: record[PRESSURE] + 1e5})
-    found = estimate_log(off, Rig(HEALTHY))
+    found = estimate_log(off, Rig("paper", HEALTHY))
     assert first_load(off) != 0.0
     (offset,) = [note.data["offset_pa"] for note in found.notes if note.code is RigCode.PRESSURE_OFFSET]
     assert offset == pytest.approx(1e5, rel=0.02)
@@ -285,7 +285,7 @@ def test_bulk_modulus_is_right_in_a_log_cut_at_a_zero_crossing_of_pressure() -> 
     begun = run.slice(crossing, len(run))
     assert first_load(begun) == 0.0
     assert begins_in_motion(begun)
-    found = estimate_log(begun, Rig(HEALTHY))
+    found = estimate_log(begun, Rig("paper", HEALTHY))
     (low, high), value = found.quantities["bulk_modulus"].ci95, found.quantities["bulk_modulus"].value
     assert found.gate.passed
     assert low <= HEALTHY.bulk_modulus <= high
@@ -306,15 +306,17 @@ def test_wear_of_the_pump_is_not_excluded_by_a_log_at_one_speed() -> None:
     leaky = parameters_for(CONDITIONS["major_leakage"])
     one_speed = 100.0 * np.where(np.arange(1200) // 50 % 2, -1.0, 1.0)
     record = simulate(CIRCUIT, one_speed, 1e-3, leaky, sensors=BENCH, rng=np.random.default_rng(3))
-    found = estimate_log(record, Rig(HEALTHY))
+    found = estimate_log(record, Rig("paper", HEALTHY))
     assert RigCode.WEAR_NOT_EXCLUDED in [note.code for note in found.notes]
     worn = found.evidence.spreads["pump_displacement"]
     assert worn.down > OPEN_DELIVERY > worn.up
     pressure = np.roll(record["differential_pressure_pa"], 5)
     pressure[:5] = pressure[5]
-    late = estimate_log(record.replace(differential_pressure_pa=pressure), Rig(HEALTHY))
+    late = estimate_log(record.replace(differential_pressure_pa=pressure), Rig("paper", HEALTHY))
     assert {RigCode.WEAR_NOT_EXCLUDED, "pressure_late"} <= {note.code for note in late.notes}
-    assert RigCode.WEAR_NOT_EXCLUDED not in [note.code for note in estimate_log(log("steps", 1.0), Rig(HEALTHY)).notes]
+    assert RigCode.WEAR_NOT_EXCLUDED not in [
+        note.code for note in estimate_log(log("steps", 1.0), Rig("paper", HEALTHY)).notes
+    ]
 
 
 def test_the_note_on_possible_wear_warns_that_bulk_modulus_may_be_too_low_and_it_is() -> None:

@@ -10,6 +10,7 @@ import pytest
 from estimation.eha.result import BulkModulusEstimate, wide_bound_note, without_number
 from estimation.finding import Finding, Gate, Outcome
 from estimation.log_checks.clean import clean_log
+from estimation.log_checks.notes import LoggerCode
 from estimation.notes import ChannelCode, EstimateCode, RigCode
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis import by_circuits, corrected_case, diagnose, known_losses
@@ -54,7 +55,7 @@ def test_a_plain_log_has_its_class_and_no_objection() -> None:
 
 
 @pytest.mark.parametrize("rows", thinned([2, 5], [5]))
-def test_a_pressure_averaged_by_its_logger_is_used_and_its_lag_estimated(rows: int) -> None:
+def test_the_model_is_averaged_as_a_pressure_was_by_its_logger(rows: int) -> None:
     p, rng = parameters_for(CONDITIONS["minor_leakage"]), np.random.default_rng(8)
     record = simulate(CIRCUIT, make_drive("steps", 2.0, 1e-3, p, rng), 1e-3, p, sensors=BENCH, rng=rng)
     pressure = np.concatenate([np.full(rows - 1, record[PRESSURE][0]), record[PRESSURE]])
@@ -63,8 +64,8 @@ def test_a_pressure_averaged_by_its_logger_is_used_and_its_lag_estimated(rows: i
     assert (found.outcome, found.condition, found.unknown) == (Outcome.OK, "minor_leakage", False)
     assert found.quantities["bulk_modulus"].value == pytest.approx(HEALTHY.bulk_modulus, rel=0.005)
     assert ClassCode.ONE_SCALE not in {note.code for note in found.all_notes}  # pressure contributes
-    late = [note.data["late_ms"] for note in found.all_notes if note.code == RigCode.PRESSURE_LATE]
-    assert late == pytest.approx([0.5 * (rows - 1)], abs=0.3)
+    assert [note.data["rows"] for note in found.all_notes if note.code == LoggerCode.AVERAGED] == [rows]
+    assert RigCode.PRESSURE_LATE not in {note.code for note in found.all_notes}
 
 
 def test_circuits_are_fitted_to_the_speed_without_its_offset() -> None:

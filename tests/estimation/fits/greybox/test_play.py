@@ -241,7 +241,7 @@ def concluded(
     fit = replace(made_fit(500.0, 2e8, 1e5), play=ShownPlay(3e-5, plain, moved={"bulk_modulus": -0.02}))
     played = replace(made_fit(100.0, 2.1e8, 1e5, chi=chi), play=ShownPlay(1e-5, strange))
     values = {name: (value, played.std[name]) for name, value in played.values.items()}
-    explanation = SimpleNamespace(names=("position_play",), values=values, fit=played, fits=(played,))
+    explanation = SimpleNamespace(names=("position_play",), values=values, priors=None, fit=played, fits=(played,))
     explanation.weights, explanation.delivery_open, explanation.in_detail = np.ones(1), NO_GAIN, explanation
 
     def explained(*_: Any, asked: Sequence[Hypothesis], paired: bool, **__: Any) -> Any:

@@ -95,7 +95,7 @@ def test_no_end_stop_is_found_in_a_poor_fit_with_another_cause() -> None:
 def test_a_finding_names_the_end_stop_and_the_right_class() -> None:
     truth = replace(RIG, stroke=0.04)
     record = simulate(CIRCUIT, OUT_AND_BACK, 1e-3, truth, sensors=BENCH, rng=np.random.default_rng(1))
-    found = diagnose_log(record, Rig(RIG))
+    found = diagnose_log(record, Rig("short stroke", RIG))
     (said,) = [note for note in found.notes if note.code is ClassCode.END_STOP]
     assert said.data["reach_mm"] == pytest.approx(20.0, abs=0.5)
     assert (found.condition, found.against) == ("normal", ())
