@@ -1,5 +1,6 @@
 """`hydrostate identify LOG --input U --output Y`: a model between any columns, validated, saved and simulated again."""
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
@@ -151,10 +152,7 @@ def _output_result(
             held = channels_of(tests, fit.inputs, output, found.model.sample_time, split=True)
         except HydrostateError as wrong:
             raise HydrostateError(f"{named}: {wrong}") from wrong
-        test = {
-            "files": [str(one) for one in fit.validate],
-            **quality_of(found.model, held, named, found.expected_error),
-        }
+        test = {"files": [str(one) for one in fit.validate], **_validated(found, held, named)}
     if not (fit.figure or fit.simulated or fit.response):
         return {**BLANK, **column_entries(found), "test": test, "frequency_response": None}
     data = found.at_one_offset(channels_of(records, fit.inputs, output, fit.resampled))
@@ -169,6 +167,19 @@ def _output_result(
     response = paths_by_owner(fit.response, fit.outputs).get(output)
     answer = None if response is None else _response(data, logs[0].name, response)
     return {**BLANK, **column_entries(found), "test": test, "frequency_response": answer}
+
+
+def _validated(found: "Identified", held: "Channels", named: str) -> dict[str, Any]:
+    """Return the quality on other logs, and whether held-back blocks promised clearly more, with a warning then."""
+    from estimation.identification.free_run.model import FreeRunQuality
+    from estimation.identification.free_run.validation_notes import validation_notes
+    from plant.errors import LogWarning
+
+    quality = quality_of(found.model, held, named)
+    worse = validation_notes(found.model, FreeRunQuality(**quality), found.expected_error, named)
+    for note in worse:
+        warnings.warn(LogWarning(note), stacklevel=2)
+    return {**quality, "clearly_worse": bool(worse)}
 
 
 def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:

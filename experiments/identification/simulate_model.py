@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from math import isnan, nan
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -124,30 +124,24 @@ def record_of(log: Path, wanted: Sequence[str], fit: "ColumnFit", *, assumed: fl
     return without_repeated_rows(record, wanted)
 
 
-def quality_of(
-    model: "FreeRunModel", data: "Channels", named: str = "the log", expected: float = nan
-) -> dict[str, Any]:
+def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> dict[str, Any]:
     """Return the fit of a model to its outputs, under the names of the JSON contract.
 
     Parameters
     ----------
     named : str
         What the reader calls the logs.
-    expected : float
-        `Identified.expected_error` of the model; NaN if it is not known [dimensionless].
 
     Warns
     -----
     LogWarning
-        If inputs lie beyond those that a polynomial model was fitted to or do not determine it, no log is longer than
-        its dead time, or the error is clearly larger than expected.
+        If inputs lie beyond those that a polynomial model was fitted to or do not determine it, or no log is longer
+        than its dead time.
     """
     from estimation.identification.free_run.input_range import doubts_about_inputs
-    from estimation.identification.free_run.validation_notes import validation_notes
 
     quality, judged = model.judged_quality(data.u, data.y)
-    worse = validation_notes(model, quality, expected, named)
-    for note in (*doubts_about_inputs(model, data, judged, named), *worse):
+    for note in doubts_about_inputs(model, data, judged, named):
         warnings.warn(LogWarning(note), stacklevel=2)
     return vars(quality)
 

@@ -80,7 +80,15 @@ def title_of(view: IdentifiedView) -> str:
         return f"{said}, fitted to changes: the output also wanders by itself."
     if held is None:
         return f"{said}: fit {own:.1f} % on the data of the fit; the log is too short to hold data back."
-    return f"{said}: fit {held:.1f} % on data held back from the fit."
+    return f"{said}: fit {held:.1f} % on data held back from the fit{_on_other_logs(view)}."
+
+
+def _on_other_logs(view: IdentifiedView) -> str:
+    """Return the fit on the logs of ``--validate``, to stand behind that on held-back data; empty without them."""
+    test = view.result.get("test")
+    if not test or not math.isfinite(test["fit_percent"]):
+        return ""
+    return f", {test['fit_percent']:.1f} % on {', '.join(test['files'])}"
 
 
 def _why_unusable(view: IdentifiedView) -> str:
@@ -185,6 +193,8 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
         bad.append("Inputs beyond that range: the log says nothing about them.")
         if has_random_walk(view):
             bad.append(f"The level of {view.output.name}: it also moves by itself.")
+        if (view.result.get("test") or {}).get("clearly_worse"):
+            bad.append(f"Logs like {', '.join(view.result['test']['files'])}: there, the model errs far more.")
     # the measured response includes samples at limits, but the transfer function describes the plant without them
     compared = usable and view.is_linear and not has_limits(view)
     band = determined_band(measured) if compared else None

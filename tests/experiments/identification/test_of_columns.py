@@ -79,10 +79,10 @@ def test_a_validation_log_of_another_plant_is_named_beside_what_held_back_blocks
     other["heat"] = filtered([0.0, 0.0, 0.4], [1.0, -0.8], other["load"])
     other.to_csv(path := tmp_path / "other.csv", index=False)
     asked = ("--input", "load", "--output", "heat", "--order", 1, "--delay", 2, "--json")
-    (one,) = json.loads(run(logs[0], *asked, "--validate", path).stdout)
+    (one,), (same,) = (json.loads(run(logs[0], *asked, "--validate", log).stdout) for log in (path, logs[1]))
     (told,) = one["warnings"]
     assert f"leaves {1.0 - one['test']['fit_percent'] / 100.0:.0%} of the deviation of 'heat' in --validate" in told
-    assert json.loads(run(logs[0], *asked, "--validate", logs[1]).stdout)[0]["warnings"] == []
+    assert (one["test"]["clearly_worse"], same["test"]["clearly_worse"], same["warnings"]) == (True, False, [])
 
 
 def test_a_test_log_that_is_too_short_is_named(logs: list[Path], tmp_path: Path) -> None:

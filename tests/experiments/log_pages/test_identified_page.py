@@ -117,6 +117,15 @@ def test_a_model_with_an_error_model_is_named_so_and_its_control_file_leaves_tha
     assert "error model" not in title_of(seen()) + control_text(seen())
 
 
+@pytest.mark.parametrize("worse", [False, True])
+def test_the_fit_on_validation_logs_stands_in_the_title_and_a_poor_one_restricts_the_use(worse: bool) -> None:
+    view = seen(test={"files": ["a.csv", "b.csv"], "fit_percent": 51.52, "clearly_worse": worse})
+    assert title_of(view).endswith("fit 95.0 % on data held back from the fit, 51.5 % on a.csv, b.csv.")
+    said = [one for one in uses_of(view, None)[1] if one.startswith("Logs like a.csv, b.csv")]
+    assert len(said) == worse
+    assert "on a.csv" not in title_of(seen(test={"files": ["a.csv"], "fit_percent": float("nan")}))
+
+
 def test_failed_residual_tests_and_an_uncertain_gain_restrict_the_use_of_the_model() -> None:
     tests = {"whiteness_p": 1e-9, "cross_correlation_p": 1e-9}
     view = seen(validation=tests, dc_gain={"value": 1e-4, "std": 1e-4, "ci95": (-1e-4, 3e-4)})
