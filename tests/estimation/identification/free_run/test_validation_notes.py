@@ -29,7 +29,7 @@ def found() -> Identified:
 
 def codes(found: Identified, other: Channels) -> list[str]:
     quality = found.model.quality(other.u, other.y)
-    return [note.code for note in validation_notes(found.model, quality, found.expected_error, "the log")]
+    return [str(note.code) for note in validation_notes(found.model, quality, found.expected_error, "the log")]
 
 
 @pytest.mark.parametrize("seed", range(1, 9))
