@@ -58,12 +58,12 @@ def without_wrong_clocks(named: "Mapping[str, ActuatorAndDate]") -> "dict[str, A
 
     Parameters
     ----------
-    named : Mapping[str, Named]
+    named : Mapping[str, ActuatorAndDate]
         By file.
 
     Returns
     -------
-    dict[str, Named]
+    dict[str, ActuatorAndDate]
         By file; a log with a wrong date has a ``problem`` in place of an actuator and a date.
     """
     dated = sorted((one.place, file) for file, one in named.items() if one.has_calendar_date and one.place is not None)

@@ -17,14 +17,14 @@ def apart_by_folder(named: "Mapping[str, ActuatorAndDate]", folders: Mapping[str
 
     Parameters
     ----------
-    named : Mapping[str, Named]
+    named : Mapping[str, ActuatorAndDate]
         By file.
     folders : Mapping[str, str]
         Folder that holds the actuator, by file; empty for the fleet's own.
 
     Returns
     -------
-    dict[str, Named]
+    dict[str, ActuatorAndDate]
         By file; the name is that of folder and actuator where folders differ.
     """
     places: dict[str, dict[str, list[float]]] = {}

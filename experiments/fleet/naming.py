@@ -141,7 +141,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]
 
     Returns
     -------
-    dict[str, Named]
+    dict[str, ActuatorAndDate]
         By file. Files that do not match are `UNNAMED`; files with an unreadable date have a ``problem`` instead of an
         actuator.
 
@@ -201,7 +201,7 @@ def by_dates(files: Iterable[str], folder: str = "") -> dict[str, ActuatorAndDat
 
     Returns
     -------
-    dict[str, Named]
+    dict[str, ActuatorAndDate]
         By file. Empty if names do not group the logs: no actuator has two logs.
 
     Examples
@@ -302,7 +302,7 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, ActuatorAndDate]:
 
     Returns
     -------
-    dict[str, Named]
+    dict[str, ActuatorAndDate]
         By file. Files that are not in the table are `UNNAMED`; files with an unreadable date have a ``problem`` instead
         of an actuator.
 

@@ -134,7 +134,7 @@ def log_rows(
     rows : iterable of Mapping
         Rows of a batch store, with ``file``, ``verb``, ``outcome``, ``found_condition``, ``reason`` and ``quantities``,
         and with ``against`` if it is known.
-    names : Mapping[str, Named]
+    names : Mapping[str, ActuatorAndDate]
         By file.
     limits : Mapping[str, float]
         Limits that replace those of the store, by severity [its unit].
