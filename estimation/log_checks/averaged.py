@@ -4,6 +4,8 @@ The spectrum of such a channel has zeros at all multiples of the sample rate ove
 actuator.
 """
 
+from functools import cache
+
 import numpy as np
 
 from estimation.log_checks.channel_names import POSITION, PRESSURE, PRESSURES, SPEED
@@ -97,6 +99,7 @@ def averaged_rows(values: Array) -> tuple[int, float]:
     return counts[best], variance
 
 
+@cache
 def _mean_spectrum(rows: int, length: int) -> Array:
     """Return the power that windows have of white noise of unit variance, averaged over rows."""
     taper = taper_of(length)

@@ -56,6 +56,31 @@ class Table:
     label: str = ""
     offset: float = 0.0
 
+    def column(self, place: int) -> Column:
+        """Return the column at a place, whatever it is called, as one that is left out if it holds no numbers."""
+        return Column(place, self.headings[place].name, f"{TRUTH_PREFIX}{place}")
+
+    def read_quietly(self, places: Sequence[int]) -> dict[int, Array]:
+        """Return columns by their places, without the warnings that are given when channels are read.
+
+        Parameters
+        ----------
+        places : sequence of int
+            Places of the columns.
+
+        Returns
+        -------
+        dict[int, ndarray of shape (n,)]
+            Values as logged, by place. Columns without numbers are left out, and all if the file cannot be read.
+        """
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = self.read([self.column(place) for place in places])
+        except LogError:
+            return {}
+        return {column.position: values for column, values in found.items()}
+
     def numbers(self, time: Column | None = None) -> dict[int, Array]:
         """Return every column that holds numbers or times.
 
@@ -76,7 +101,7 @@ class Table:
         LogError
             If the column of time cannot be read.
         """
-        columns = [Column(place, one.name, f"{TRUTH_PREFIX}{place}") for place, one in enumerate(self.headings)]
+        columns = [self.column(place) for place in range(len(self.headings))]
         if time is not None:
             columns[time.position] = time
         self._require_room(columns)

@@ -1,13 +1,11 @@
 """Clocks that a file repeats beside each channel: LabVIEW, Simulink and spreadsheets write time and value in pairs."""
 
 import re
-import warnings
 from dataclasses import replace
 
 import numpy as np
 
-from plant.errors import LogError
-from plant.log.columns import TIME, TIME_NAMES, TRUTH_PREFIX, Column
+from plant.log.columns import TIME, TIME_NAMES
 from plant.log.headings import Heading
 from plant.log.table import Table
 from plant.units import converts
@@ -34,19 +32,13 @@ def without_repeated_clocks(table: Table) -> Table:
     clocks = [place for place, name in named if name == named[0][1]]  # a clock of another name may be asked for
     if len(clocks) < 2:
         return table
-    columns = [Column(place, table.headings[place].name, f"{TRUTH_PREFIX}{place}") for place in clocks]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are given when the channels are read
-            found = table.read(columns)
-    except LogError:
-        return table
-    first = found.get(columns[0])
+    found = table.read_quietly(clocks)
+    first = found.get(clocks[0])
     headings = list(table.headings)
-    for column in columns[1:]:
-        if first is not None and column in found and np.array_equal(first, found[column]):
-            beside = "".join(one.bare for one in table.headings[column.position + 1 : column.position + 2])
-            headings[column.position] = Heading(f"time of {beside or column.position + 1}")
+    for place in clocks[1:]:
+        if first is not None and place in found and np.array_equal(first, found[place]):
+            beside = "".join(one.bare for one in table.headings[place + 1 : place + 2])
+            headings[place] = Heading(f"time of {beside or place + 1}")
     return replace(table, headings=tuple(headings))
 
 

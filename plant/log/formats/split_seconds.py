@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from plant.errors import LogError, LogWarning
-from plant.log.columns import TIME, TIME_NAMES, TRUTH_PREFIX, Column
+from plant.errors import LogWarning
+from plant.log.columns import TIME, TIME_NAMES, Column
 from plant.log.headings import Heading
 from plant.log.notes import LogCode
 from plant.log.table import Table
@@ -56,22 +56,12 @@ def _counts_seconds(heading: Heading) -> bool:
     return heading.stamped or bool(named and heading.unit in (None, "s", "sec"))
 
 
-def _column(table: Table, place: int) -> Column:
-    return Column(place, table.headings[place].name, f"{TRUTH_PREFIX}{place}")
-
-
 def _are_one(table: Table, place: int, size: int) -> bool:
     """Return whether two columns are the seconds and the parts of a second of one time."""
-    columns = [_column(table, place), _column(table, place + 1)]
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # they are given when the channels are read
-            found = table.read(columns)
-    except LogError:
+    found = table.read_quietly([place, place + 1])
+    if len(found) < 2:
         return False
-    if len(found) < len(columns):
-        return False
-    seconds, parts = _whole_seconds(found[columns[0]]), found[columns[1]]
+    seconds, parts = _whole_seconds(found[place]), found[place + 1]
     if seconds is None or parts.dtype.kind != "f" or len(seconds) < 3 or not np.isfinite(parts).all():
         return False
     rise, fall = np.diff(seconds), np.diff(parts)
@@ -89,7 +79,7 @@ def _whole_seconds(values: Any) -> Any:
 
 
 def _joined(table: Table, place: int, size: int) -> Table:
-    beside = _column(table, place + 1)
+    beside = table.column(place + 1)
 
     def read(columns: Sequence[Column]) -> dict[Column, Any]:
         if all(one.position != place for one in columns):
