@@ -27,6 +27,7 @@ def test_a_sudden_change_is_dated_and_a_slow_one_reported_as_growth() -> None:
         "the flow balance changed at 11.25 s of the stream (95 % interval 11.00 to 11.50 s): "
         "the piston gets a different share of the pump's flow than before"
     )
+    assert "leakage has grown by more than warm oil explains" in slow["message"]
     assert "since about 11 s of the stream (95 % interval 11 to 12 s)" in slow["message"]
     assert (sudden["since_s"], sudden["since_ci95_s"]) == (11.25, [11.0, 11.5])
 
