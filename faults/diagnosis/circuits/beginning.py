@@ -70,11 +70,17 @@ def beginning_of(record: Record, pressure: Array | None, velocity: Array) -> Beg
     first = float(np.nan_to_num(velocity[0]))
     if pressure is not None:
         values = (float(pressure[0]), first) if np.isfinite(pressure[0]) else None
-        least = LEAST_START_PRESSURE * float(np.sqrt(np.nanmean(pressure**2)))
+        least = LEAST_START_PRESSURE * _rms(pressure)
         return Beginning(values if values is not None and abs(values[0]) > least else None, values, 0.0, SETTLING)
     if not begins_in_motion(record, LEAST_MOTION):
         return Beginning(None, None, 0.0, SETTLING)
-    slides = abs(first) > LEAST_MOTION * float(np.sqrt(np.nanmean(velocity**2)))
+    slides = abs(first) > LEAST_MOTION * _rms(velocity)
     share, most = (0.3, SLIDING_SETTLING) if slides else (0.2, TURNING_SETTLING)
     settling = float(np.clip(share * record.duration, SETTLING, most))
     return Beginning(None, None, first if slides else 0.0, settling)
+
+
+def _rms(values: Array) -> float:
+    """Return the root mean square of the known values; 0 if none is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0

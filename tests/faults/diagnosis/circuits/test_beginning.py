@@ -43,3 +43,9 @@ def test_a_log_begins_under_a_pressure_that_is_more_than_noise(first: float, beg
     record = Record(1e-2, {"motor_speed_rad_s": np.full(2000, 60.0)})
     found = beginning_of(record, np.append(first, np.full(1999, 1e6)), np.full(2000, 0.02))
     assert found == Beginning(begun, None if np.isnan(first) else (first, 0.02), 0.0, SETTLING)
+
+
+def test_a_log_whose_blocks_know_no_velocity_begins_at_rest() -> None:
+    record = Record(1e-2, {"motor_speed_rad_s": np.full(2000, 60.0)})
+    unknown = np.full(2000, np.nan)
+    assert beginning_of(record, None, unknown) == Beginning(None, None, 0.0, TURNING_SETTLING)
