@@ -17,6 +17,10 @@ UNKNOWNS = ("bulk_modulus", "gas_fraction", "crossport_leakage", "load_force")
 LEAKAGE, LOAD = 2e-12, 10.0
 """Reference sizes of leakage [m^3/(s Pa)] and load [N]."""
 
+MOST_LEAKAGE = 2e-11
+"""Largest leakage across the piston that counts as a leak [m^3/(s Pa)]: it takes two thirds of the velocity under 10 N
+(200 V, 480 Hz)."""
+
 
 def flow_change(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float, factor: float) -> float:
     """Return the change of mean flow with bulk modulus.

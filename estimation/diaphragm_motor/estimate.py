@@ -46,6 +46,8 @@ class MotorEstimate:
         Chi-square of the electrodes' pattern over its degrees of freedom [dimensionless].
     pattern_holds : bool
         Whether the pump is healthy apart from gas, so that the maps hold.
+    velocity : float
+        Mean velocity of the rod [m/s].
     """
 
     values: Mapping[str, float]
@@ -53,6 +55,7 @@ class MotorEstimate:
     pattern: float
     pattern_holds: bool
     drive: Drive
+    velocity: float
     track: MotorTrack
     parameters: DiaphragmMotorParameters
 
@@ -95,6 +98,7 @@ def estimate_motor(
         pattern / freedom,
         pattern <= float(chdtri(freedom, LEAST_PATTERN_PROBABILITY)),
         seen.drive,
+        seen.velocity,
         track,
         replace(pump, crossport_leakage=max(0.0, leakage), load_force=load),
     )

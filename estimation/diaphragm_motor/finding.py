@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from estimation.diaphragm_motor.card import LEAKAGE, LOAD, flow_change, motor_card
+from estimation.diaphragm_motor.card import LEAKAGE, LOAD, MOST_LEAKAGE, flow_change, motor_card
 from estimation.diaphragm_motor.estimate import MotorEstimate, estimate_motor
-from estimation.diaphragm_motor.signature import Signature
+from estimation.diaphragm_motor.signature import GAIN_TOLERANCE, Signature
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from estimation.trust.card import percent
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
@@ -36,6 +36,14 @@ class MotorCode(Code):
     FASTER_THAN_MAPS = (
         "the rod moves faster than the pump's maps allow (leakage {leakage:.2g|L/(min bar)} L/(min bar)): ports may be "
         "clogged"
+    )
+    ROD_BACKWARDS = (
+        "the rod moves against the pump's flow, faster than any leak explains (leakage {leakage:.2g|L/(min bar)} "
+        "L/(min bar)): position_m has the opposite sign, or the valve retracts (spool = -1 in the rig file)"
+    )
+    AS_DESIGNED = (
+        "without a healthy run (--healthy) the intervals assume that gains, drive and motor agree with the rig file to "
+        "{percent:.2g} %"
     )
     TOO_UNCERTAIN = (
         "too uncertain for a value: {names}; apply a load of 10 N or more, or give a healthy run (--healthy)"
@@ -73,7 +81,7 @@ def motor_finding(
         If the log cannot be used.
     """
     found = estimate_motor(record, healthy, calibration=calibration)
-    reasons = _pattern_notes(found)
+    reasons = _pattern_notes(found, healthy)
     quantities = {name: _quantity(name, found, told=not reasons) for name in SIZES}
     lost = [name for name, one in quantities.items() if one.value is None]
     believed = healthy if reasons else found.parameters
@@ -85,6 +93,8 @@ def motor_finding(
         not_told.append(MotorCode.TOO_UNCERTAIN.note(names=", ".join(name.replace("_", " ") for name in lost)))
     if quantities["load_force"].value is not None:
         not_told.append(MotorCode.LOAD_AND_FRICTION.note())
+    if calibration is None and not reasons:
+        not_told.append(MotorCode.AS_DESIGNED.note(percent=100.0 * GAIN_TOLERANCE))
     told = Outcome.NOT_OBSERVABLE if len(lost) == len(SIZES) else Outcome.OK
     return Finding(
         actuator=NAME,
@@ -125,10 +135,12 @@ def motor_prospect(motor: DiaphragmMotorParameters, frequency: float, peak_to_pe
     return Finding(NAME, Outcome.OK, quantities, Gate(True, ()), card.channels, evidence=card)
 
 
-def _pattern_notes(found: MotorEstimate) -> tuple[Note, ...]:
+def _pattern_notes(found: MotorEstimate, healthy: DiaphragmMotorParameters) -> tuple[Note, ...]:
     leakage, deviation = (one["crossport_leakage"] for one in (found.values, found.deviations))
     if not found.pattern_holds:
         return (MotorCode.PATTERN_BROKEN.note(chi_square=found.pattern),)
+    if found.velocity * healthy.spool < 0.0 and leakage > MOST_LEAKAGE:
+        return (MotorCode.ROD_BACKWARDS.note(leakage=leakage),)
     if leakage < -CLEARLY_NEGATIVE_DEVIATIONS * deviation:
         return (MotorCode.FASTER_THAN_MAPS.note(leakage=leakage),)
     return ()

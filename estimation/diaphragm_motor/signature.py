@@ -94,9 +94,27 @@ class Signature:
         return self.values[:7] + 1j * self.values[7:14]
 
     @property
+    def second_tones(self) -> Tones:
+        """Electrodes' second harmonics relative to the drive [V]."""
+        return self.values[14:21] + 1j * self.values[21:28]
+
+    @property
     def velocity(self) -> float:
         """Mean velocity [m/s]."""
         return float(self.values[-1])
+
+    def earlier(self, delay: float) -> "Signature":
+        """Return the signature of electrodes that are earlier by a delay.
+
+        Parameters
+        ----------
+        delay : float
+            Time by which their tones turn [s].
+        """
+        turn = np.exp(2j * pi * self.drive.frequency * delay)
+        first, second = turn * self.tones, turn**2 * self.second_tones
+        values = np.concatenate([first.real, first.imag, second.real, second.imag, [self.velocity]])
+        return replace(self, values=values)
 
 
 def modelled_signature(p: DiaphragmMotorParameters, frequency: float, peak_to_peak: float) -> Floats:

@@ -42,6 +42,8 @@ class StackEstimate:
         The actuator with the estimates.
     samples : int
         Samples of each channel [count].
+    delay : float
+        Delay of all channels behind the drive that is left in the residuals, to first order [s].
     """
 
     values: Mapping[str, float]
@@ -51,6 +53,7 @@ class StackEstimate:
     evaluations: int
     parameters: PiezoStackParameters | SimpleNamespace
     samples: int
+    delay: float
 
     def interval(self, name: str) -> tuple[float, float]:
         """Return a quantity's 95 % interval.
@@ -297,4 +300,15 @@ def _concluded_estimate(runs: StackRuns, best: _Optimum, evaluations: int) -> St
         evaluations,
         p,
         len(parts[0]),
+        _delay_left(runs, best),
     )
+
+
+def _delay_left(runs: StackRuns, best: _Optimum) -> float:
+    """Return the delay that the residuals show, with all unknowns free [s]."""
+    parts = np.split(best.residuals + runs.measured, len(runs.noise))
+    rates = np.concatenate([np.gradient(part, runs.sample_time) for part in parts])
+    # scaled to the size of the unknowns' slopes, a milliradian of the drive
+    slopes = np.column_stack([best.slopes, 1e-6 * rates])
+    shown = -_determined_covariance(slopes) @ (slopes.T @ best.residuals)
+    return -1e-6 * float(shown[-1])

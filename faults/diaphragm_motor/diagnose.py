@@ -6,7 +6,7 @@ evidence, by Laplace's rule, gives its probability. Faults that one bench cannot
 are named together. If no curve comes near, the fault is unknown.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log, pi, sqrt
@@ -16,6 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
 
+from estimation.diaphragm_motor.channel_mistakes import mistakes_that_explain
 from estimation.diaphragm_motor.signature import Signature, logged_signature, modelled_signature, tolerance
 from estimation.finding import interval_95
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, MotorFault, motor_with_fault
@@ -45,6 +46,12 @@ SAME_DRIVE = 0.005
 
 LEAST_TONE = 0.1
 """Fundamental of an electrode below which a motor cannot be healthy [V] (judged)."""
+
+LONGEST_DELAY = 0.125
+"""Longest delay of the electrodes that is tried [cycles of the drive] (judged)."""
+
+_DELAYS = 16
+"""Delays of either sign that are tried before the best is sought [count]."""
 
 _FUNDAMENTALS = 2 * DIAPHRAGMS
 """Numbers at the beginning of a signature: real parts of the electrodes' fundamentals, then imaginary ones."""
@@ -109,6 +116,8 @@ class MotorDiagnosis:
     lookalikes : tuple of str
         Faults that change the electrodes' fundamentals in the same direction as the best one. Those outside the group
         are told from it by velocity, second harmonics and the last few percent, so only as far as the model is exact.
+    delay : float, optional
+        Delay of all electrodes behind the drive without which a fault would explain an unknown log [s].
     """
 
     matches: tuple[Match, ...]
@@ -117,6 +126,7 @@ class MotorDiagnosis:
     signature: Signature
     expected: Floats
     lookalikes: tuple[str, ...]
+    delay: float | None = None
 
     @property
     def best(self) -> Match:
@@ -190,7 +200,33 @@ def diagnose_motor(
         If the log cannot be used, or the calibration is of another drive.
     """
     seen = logged_signature(record)
-    return diagnose_signature(seen if calibration is None else _converted_to_model(seen, calibration, healthy), healthy)
+
+    def diagnosed(one: Signature) -> MotorDiagnosis:
+        return diagnose_signature(
+            one if calibration is None else _converted_to_model(one, calibration, healthy), healthy
+        )
+
+    found = diagnosed(seen)
+    if not found.unknown:
+        return found
+    mistakes = mistakes_that_explain(seen, lambda one: not diagnosed(one).unknown)
+    if mistakes:
+        raise LogError(f"{' or '.join(mistakes)}: say so in the rig file's [columns] or by --columns")
+    return replace(found, delay=_delay_that_explains(seen, diagnosed))
+
+
+def _delay_that_explains(seen: Signature, diagnosed: Callable[[Signature], MotorDiagnosis]) -> float | None:
+    """Return the delay of all electrodes behind the drive [s] without which a fault explains a log; None without."""
+    longest = LONGEST_DELAY / seen.drive.frequency
+
+    def chi_square(delay: float) -> float:
+        return min(match.chi_square for match in diagnosed(seen.earlier(delay)).matches)
+
+    tried = np.linspace(-longest, longest, 2 * _DELAYS + 1)
+    best, step = tried[int(np.argmin([chi_square(float(one)) for one in tried]))], longest / _DELAYS
+    ends = best - step, best + step
+    found = minimize_scalar(chi_square, bounds=ends, method="bounded", options={"xatol": 1e-2 * step})
+    return None if diagnosed(seen.earlier(float(found.x))).unknown else float(found.x)
 
 
 def diagnose_signature(seen: Signature, healthy: DiaphragmMotorParameters) -> MotorDiagnosis:
@@ -288,10 +324,10 @@ def _converted_to_model(seen: Signature, calibration: Signature, healthy: Diaphr
         raise LogError(f"the healthy run has an electrode below {LEAST_TONE:g} V: it is not of a healthy motor")
     model = modelled_signature(healthy, *_operating_point(calibration))
     turn = (model[:DIAPHRAGMS] + 1j * model[DIAPHRAGMS:_FUNDAMENTALS]) / calibration.tones
-    gain = np.tile(np.abs(turn), 2)
     first = seen.tones * turn
-    second = slice(_FUNDAMENTALS, 2 * _FUNDAMENTALS)
-    harmonics = model[second] + gain * (seen.values - calibration.values)[second]
+    # a delay of an electrode turns its second harmonic by twice the angle of the first one
+    change = (seen.second_tones - calibration.second_tones) * turn**2 / np.abs(turn)
+    second = model[_FUNDAMENTALS : 2 * _FUNDAMENTALS] + np.concatenate([change.real, change.imag])
     velocity = model[-1] + seen.velocity - calibration.velocity
-    values = np.concatenate([first.real, first.imag, harmonics, [velocity]])
+    values = np.concatenate([first.real, first.imag, second, [velocity]])
     return replace(seen, values=values, covariance=seen.covariance + calibration.covariance)

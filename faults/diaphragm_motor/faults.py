@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from operator import add
 from typing import Any, TypeAlias
 
+from estimation.diaphragm_motor.card import MOST_LEAKAGE
 from plant.diaphragm_motor.parameters import ROWS, DiaphragmMotorParameters, with_changed_value
 from plant.errors import HydrostateError, require_known
 
@@ -148,7 +149,7 @@ _ALL = (
         "crossport_leakage",
         add,
         "leakage across the piston above the healthy one",
-        (0.0, 2e-12, 5e-12, 1e-11, 1.5e-11, 2e-11),
+        (0.0, 2e-12, 5e-12, 1e-11, 1.5e-11, MOST_LEAKAGE),
         "m^3/(s Pa)",
     ),
     _whole_motor_fault(

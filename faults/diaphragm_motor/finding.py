@@ -1,6 +1,9 @@
 """`motor_fault_finding(record, motor) -> Finding`: which fault a log of the diaphragm motor shows, and its severity."""
 
-from estimation.diaphragm_motor.signature import DRIVE, POSITION, Signature
+from collections.abc import Iterator, Sequence
+
+from estimation.diaphragm_motor.finding import MotorCode
+from estimation.diaphragm_motor.signature import DRIVE, GAIN_TOLERANCE, POSITION, Signature
 from estimation.finding import Finding, Gate, Outcome, Quantity
 from faults.cylinder_advice import CylinderAdviceCode
 from faults.diaphragm_motor.diagnose import Match, MotorDiagnosis, diagnose_motor
@@ -21,6 +24,10 @@ class MotorFaultCode(Code):
     NEAREST_MISSES = (
         "the nearest fault, {fault}, leaves a chi-square of {chi_square:.3g} for {freedom} degrees of freedom: another "
         "motor or load, or several faults; calibrate on a healthy run"
+    )
+    ELECTRODES_SHIFTED = (
+        "the electrodes are {shift_us:.0f} us {side} the drive; without this delay the log is explained: check the "
+        "electrodes' filters and where the drive is measured, or calibrate on a healthy run (--healthy)"
     )
     ROD_STANDS = "the rod moves at {velocity_mm_s:.2g} mm/s: it is stalled, or at its end stop"
     LOOKS_LIKE = "from the electrodes' fundamentals alone, it could also be {faults}"
@@ -84,9 +91,7 @@ def motor_fault_finding(
         against=(MotorFaultCode.NO_FAULT_FITS.note(),) if found.unknown else (),
         faults=tuple(_fault_note(match) for match in found.group if match.name != HEALTHY and not found.unknown),
         advice=() if found.unknown else tuple(_remedy(match) for match in found.group if match.name != HEALTHY),
-        not_told=(MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(others).replace("_", " ")),)
-        if others and not found.unknown
-        else (),
+        not_told=() if found.unknown else tuple(_not_told(others, calibrated=calibration is not None)),
         evidence=found,
     )
 
@@ -112,11 +117,26 @@ def _objections(found: MotorDiagnosis) -> tuple[Note, ...]:
     if found.unknown:
         best = found.best
         reasons.append(
-            MotorFaultCode.NEAREST_MISSES.note(fault=best.name, chi_square=best.chi_square, freedom=found.freedom)
+            MotorFaultCode.NEAREST_MISSES.note(
+                fault=best.name.replace("_", " "), chi_square=best.chi_square, freedom=found.freedom
+            )
+        )
+    if found.delay is not None:
+        reasons.append(
+            MotorFaultCode.ELECTRODES_SHIFTED.note(
+                shift_us=1e6 * abs(found.delay), side="behind" if found.delay > 0.0 else "ahead of"
+            )
         )
     if abs(found.signature.velocity) < STANDSTILL_VELOCITY:
         reasons.append(MotorFaultCode.ROD_STANDS.note(velocity_mm_s=1e3 * found.signature.velocity))
     return tuple(reasons)
+
+
+def _not_told(lookalikes: Sequence[str], *, calibrated: bool) -> Iterator[Note]:
+    if lookalikes:
+        yield MotorFaultCode.LOOKS_LIKE.note(faults=" or ".join(lookalikes).replace("_", " "))
+    if not calibrated:
+        yield MotorCode.AS_DESIGNED.note(percent=100.0 * GAIN_TOLERANCE)
 
 
 def _remedy(match: Match) -> Note:

@@ -6,7 +6,7 @@ from math import log
 
 from estimation.finding import Finding, Gate, Outcome
 from estimation.piezo_stack.estimate import StackEstimate, estimate_stack
-from estimation.piezo_stack.finding import channel_disagrees, stack_quantities, undescribed_channels
+from estimation.piezo_stack.finding import channel_disagrees, estimate_in_step, stack_quantities, undescribed_channels
 from estimation.piezo_stack.runs import STACK_CHANNELS
 from estimation.piezo_stack.unknowns import DEFAULT_UNKNOWNS, STARTS
 from faults.conditions import CONDITIONS
@@ -116,18 +116,18 @@ def diagnose_stack(
     LogError
         If the log cannot be used.
     """
-    found = estimate_stack(record, healthy, channels=channels)
+    found, in_step, shifts = estimate_in_step(record, healthy, channels=channels)
     for seldom, guesses in SELDOM_UNKNOWNS:
         if undescribed_channels(found):
             unknowns, starts = (*DEFAULT_UNKNOWNS, *seldom), (*STARTS, *guesses)
-            wider = estimate_stack(record, healthy, unknowns=unknowns, channels=channels, starts=starts)
+            wider = estimate_stack(in_step, healthy, unknowns=unknowns, channels=channels, starts=starts)
             found = min(found, wider, key=lambda one: max(one.misfit.values()))
     against = tuple(
         StackFaultCode.ANOTHER_ACTUATOR.note(channel=name, ratio=ratio)
         for name, ratio in undescribed_channels(found).items()
     )
     if against:
-        against += channel_disagrees(record, healthy, tuple(found.misfit))
+        against += channel_disagrees(in_step, healthy, tuple(found.misfit))
     leakage = _level(found, "crossport_leakage", healthy.crossport_leakage, CROSSPORT_LEAKAGE)
     friction = _level(found, "coulomb_friction", healthy.coulomb_friction, ADDED_FRICTION)
     condition = next((n for n, c in CONDITIONS.items() if (c.leakage, c.friction) == (leakage, friction)), None)
@@ -145,6 +145,7 @@ def diagnose_stack(
         against=against,
         faults=faults,
         advice=() if reasons or condition is None else (*_advice(condition), *map(_remedy, faults)),
+        notes=shifts,
         evidence=found,
     )
 
@@ -229,6 +230,6 @@ def calibrated_stack(record: Record, nominal: PiezoStackParameters) -> PiezoStac
     RigError
         If what fits is no actuator.
     """
-    found = estimate_stack(record, nominal, unknowns=CALIBRATED, starts=({},))
+    found, *_ = estimate_in_step(record, nominal, unknowns=CALIBRATED, starts=({},))
     changed = [name for name in vars(found.parameters) if getattr(found.parameters, name) != getattr(nominal, name)]
     return replace(nominal, **{name: getattr(found.parameters, name) for name in changed})

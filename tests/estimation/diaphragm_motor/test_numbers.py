@@ -237,7 +237,7 @@ def doubts_of_an_estimate() -> dict[str, Any]:
     def doubts(leakage: float, *, holds: bool = True) -> list[str]:
         values, deviations = {"crossport_leakage": leakage}, {"crossport_leakage": 1e-13}
         one = replace(made, values=values, deviations=deviations, pattern_holds=holds)
-        return [str(note.code) for note in finding._pattern_notes(one)]  # pyright: ignore[reportPrivateUsage]
+        return [str(note.code) for note in finding._pattern_notes(one, MOTOR)]  # pyright: ignore[reportPrivateUsage]
 
     def told(name: str, value: float, std: float) -> bool:
         one = replace(made, values={name: value}, deviations={name: std})

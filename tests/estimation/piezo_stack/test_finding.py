@@ -33,7 +33,7 @@ def estimate(share: float, ratio: float = 1.0) -> StackEstimate:
     """Return deviations at a share of the largest one with which a number is reported, and residuals over noise."""
     deviations = {name: share * MOST_DEVIATION * size for name, size in SIZES.items()}
     misfit = {"stack_displacement_m": 1.0, "position_m": ratio}
-    return StackEstimate(dict(SIZES), deviations, np.eye(2), misfit, 10, HEALTHY, SAMPLES)
+    return StackEstimate(dict(SIZES), deviations, np.eye(2), misfit, 10, HEALTHY, SAMPLES, delay=0.0)
 
 
 def found(monkeypatch: pytest.MonkeyPatch, one: StackEstimate) -> Any:
@@ -58,6 +58,27 @@ def test_a_channel_with_a_large_misfit_withholds_every_value(monkeypatch: pytest
     assert said.outcome is Outcome.MISMATCH
     assert all(one.value is None and one.std is not None for one in said.quantities.values())
     assert found(monkeypatch, estimate(0.5, 0.99 * MOST)).gate.passed
+
+
+@pytest.mark.parametrize(
+    ("left", "corrected"),
+    [(1.0, True), (1.7**0.5, True), (1.9**0.5, False)],  # the mean square missed falls from 8
+)
+def test_a_delay_is_corrected_if_it_removes_nine_tenths_of_what_the_model_misses(
+    left: float, corrected: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = np.arange(5.0)
+
+    def fitted(record: Record, *_: Any, **__: Any) -> StackEstimate:
+        late = record["drive_voltage_v"][2] < drive[2]
+        return replace(estimate(0.5, left if late else 3.0), delay=0.0 if late else 5e-5)
+
+    monkeypatch.setattr(finding, "estimate_stack", fitted)
+    log = Record(1e-4, {"drive_voltage_v": drive})
+    found, in_step, notes = finding.estimate_in_step(log, HEALTHY)
+    assert found.misfit["position_m"] == (left if corrected else 3.0)
+    assert in_step["drive_voltage_v"] == pytest.approx([0.0, 0.5, 1.5, 2.5, 3.5] if corrected else drive)
+    assert [dict(note.data) for note in notes] == [{"shift_us": pytest.approx(50.0), "side": "behind"}] * corrected
 
 
 def test_a_parameter_that_the_sensors_do_not_determine_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

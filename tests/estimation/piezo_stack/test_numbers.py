@@ -140,6 +140,7 @@ def misfits_and_quantities() -> dict[str, Any]:
         5,
         HEALTHY,
         1_000_000,
+        delay=0.0,
     )
 
     def misses(one: float) -> list[str]:

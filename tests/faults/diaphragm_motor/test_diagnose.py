@@ -16,7 +16,7 @@ from faults.diaphragm_motor.diagnose import (
 )
 from faults.diaphragm_motor.faults import HEALTHY, MOTOR_FAULTS, motor_with_fault
 from plant.diaphragm_motor.parameters import DiaphragmMotorParameters
-from plant.diaphragm_motor.run import BENCH_SENSORS, SAMPLE_TIME, motor_drive, simulate_motor
+from plant.diaphragm_motor.run import BENCH_SENSORS, ELECTRODES, SAMPLE_TIME, motor_drive, simulate_motor
 from plant.errors import LogError
 from plant.log.record import Record
 
@@ -155,3 +155,32 @@ def test_a_healthy_run_under_another_drive_or_of_a_faulty_motor_is_refused() -> 
     dead = replace(seen, values=np.where(np.arange(len(seen.values)) % 7 == 3, 0.01, seen.values))
     with pytest.raises(LogError, match="it is not of a healthy motor"):
         _converted_to_model(seen, dead, MOTOR)
+
+
+@pytest.mark.parametrize(
+    ("name", "severity"), [(HEALTHY, 0.0), pytest.param("valve_4_leak", 0.3, marks=pytest.mark.slow)]
+)
+def test_a_channel_of_the_wrong_sign_or_name_is_refused_with_what_to_write(name: str, severity: float) -> None:
+    log = log_of(MOTOR if name == HEALTHY else motor_with_fault(MOTOR, name, severity))
+    first, third = log["electrode_1_v"], log["electrode_3_v"]
+    for made, said in (
+        (log.replace(electrode_1_v=-first), "electrode_1_v has the opposite sign: say so"),
+        (log.replace(electrode_1_v=third, electrode_3_v=first), "electrode_1_v and electrode_3_v are swapped: say so"),
+    ):
+        with pytest.raises(LogError, match=said):
+            diagnose_motor(made, MOTOR)
+
+
+@pytest.mark.parametrize("delay", [4e-5, pytest.param(-1e-4, marks=pytest.mark.slow)])
+def test_the_delay_of_all_electrodes_is_named_and_a_healthy_run_takes_it_out(delay: float) -> None:
+    log = log_of(motor_with_fault(MOTOR, "valve_4_leak", 0.3))
+    time = log.sample_time * np.arange(len(log))
+
+    def late(one: Record) -> Record:
+        return one.replace(**{name: np.interp(time - delay, time, one[name]) for name in ELECTRODES})
+
+    found = diagnose_motor(late(log), MOTOR)
+    assert found.unknown
+    assert found.delay == pytest.approx(delay, abs=2e-6)
+    calibrated = diagnose_motor(late(log), MOTOR, calibration=logged_signature(late(log_of(MOTOR, 2))))
+    assert (calibrated.best.name, calibrated.unknown, calibrated.delay) == ("valve_4_leak", False, None)

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from estimation.diaphragm_motor.finding import MotorCode
 from estimation.finding import Outcome
 from faults.diaphragm_motor import finding
 from faults.diaphragm_motor.diagnose import Match
@@ -18,9 +19,10 @@ from faults.diaphragm_motor.finding import (
 )
 
 
-def diagnosis(velocity: float, *, unknown: bool) -> Any:
+def diagnosis(velocity: float, *, unknown: bool, delay: float | None = None) -> Any:
     best = SimpleNamespace(name="valve_1_leak", chi_square=40.0)
-    return SimpleNamespace(unknown=unknown, best=best, freedom=12, signature=SimpleNamespace(velocity=velocity))
+    signature = SimpleNamespace(velocity=velocity)
+    return SimpleNamespace(unknown=unknown, best=best, freedom=12, signature=signature, delay=delay)
 
 
 @pytest.mark.parametrize("velocity", [2.0 * STANDSTILL_VELOCITY, -2.0 * STANDSTILL_VELOCITY])
@@ -30,9 +32,16 @@ def test_a_moving_rod_with_a_fitting_fault_has_no_objection(velocity: float) -> 
 
 def test_a_poorly_fitting_nearest_fault_and_a_stationary_rod_are_objections() -> None:
     misses, stands = _objections(diagnosis(-0.5 * STANDSTILL_VELOCITY, unknown=True))
-    assert misses == MotorFaultCode.NEAREST_MISSES.note(fault="valve_1_leak", chi_square=40.0, freedom=12)
+    assert misses == MotorFaultCode.NEAREST_MISSES.note(fault="valve 1 leak", chi_square=40.0, freedom=12)
     assert stands.code is MotorFaultCode.ROD_STANDS
     assert stands.data["velocity_mm_s"] == pytest.approx(-500.0 * STANDSTILL_VELOCITY)
+
+
+@pytest.mark.parametrize(("delay", "side"), [(4e-5, "40 us behind the drive"), (-4e-5, "40 us ahead of the drive")])
+def test_electrodes_that_are_late_or_early_are_an_objection_with_their_delay(delay: float, side: str) -> None:
+    _, shifted = _objections(diagnosis(1.0, unknown=True, delay=delay))
+    assert shifted.code is MotorFaultCode.ELECTRODES_SHIFTED
+    assert side in str(shifted)
 
 
 MATCHES = {name: Match(name, 0.5, 0.1, 9.0, 0.3) for name in (HEALTHY, "friction", "valve_1_leak", "load")}
@@ -75,7 +84,12 @@ def test_a_finding_names_the_group_of_nearest_faults_and_quantifies_the_first(
     )
     told = {"friction": "rod seals", "valve 1 leak": "clean valve 1 and its seat", "load": "--load"}
     assert all(told[name] in str(note) for name, note in zip(names, said.advice, strict=True))
-    assert [note.data["faults"] for note in said.not_told] == ([others] if others else [])
+    assert [note.data["faults"] for note in said.not_told if note.code is MotorFaultCode.LOOKS_LIKE] == (
+        [others] if others else []
+    )
+    assert [note.code for note in said.not_told if not unknown][-1:] == ([] if unknown else [MotorCode.AS_DESIGNED])
+    calibrated: Any = motor_fault_finding(None, None, calibration=SimpleNamespace())  # type: ignore[arg-type]
+    assert MotorCode.AS_DESIGNED not in [note.code for note in calibrated.not_told]
     for one in said.quantities.values():
         assert (one.value, one.ci95) == (0.5, pytest.approx((0.5 - 0.196, 0.5 + 0.196), abs=1e-4))
 

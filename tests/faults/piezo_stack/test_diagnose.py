@@ -91,3 +91,29 @@ def test_a_single_disagreeing_channel_is_named_without_a_fault() -> None:
     heavy = diagnose_stack(log_of(replace(HEALTHY, load_mass=HEALTHY.load_mass + 20.0)), HEALTHY)
     assert heavy.unknown
     assert not any("alone disagrees" in str(note) for note in heavy.against)
+
+
+@pytest.mark.parametrize("late", ["channels", pytest.param("drive", marks=pytest.mark.slow)])
+def test_a_log_whose_channels_or_drive_are_late_is_diagnosed_in_step(late: str) -> None:
+    name = "minor_leakage_minor_friction"
+    log = log_of(stack_in_condition(HEALTHY, name))
+    time = SAMPLE_TIME * np.arange(len(log))
+    moved = [one for one in log if (one == "drive_voltage_v") is (late == "drive")]
+    found = diagnose_stack(log.replace(**{one: np.interp(time - 1e-4, time, log[one]) for one in moved}), HEALTHY)
+    assert (found.condition, found.faults, found.gate.reasons) == (name, (), ())
+    (note,) = found.notes
+    assert dict(note.data) == {
+        "shift_us": pytest.approx(100.0, abs=4.0),
+        "side": "behind" if late == "channels" else "ahead of",
+    }
+
+
+@pytest.mark.slow
+def test_a_single_late_channel_is_named_and_no_delay_of_all_is_corrected() -> None:
+    log = log_of(HEALTHY)
+    time = SAMPLE_TIME * np.arange(len(log))
+    found = diagnose_stack(
+        log.replace(chamber_pressure_pa=np.interp(time - 1e-4, time, log["chamber_pressure_pa"])), HEALTHY
+    )
+    assert str(found.against[-1]).startswith("chamber_pressure_pa alone disagrees")
+    assert found.notes == ()

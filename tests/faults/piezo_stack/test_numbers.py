@@ -31,7 +31,7 @@ def faults_of_a_stack() -> dict[str, Any]:
 
 def estimate(**of: tuple[float, float]) -> StackEstimate:
     values, deviations = ({name: one[k] for name, one in of.items()} for k in (0, 1))
-    return StackEstimate(values, deviations, np.eye(len(of)), {"position_m": 1.0}, 1, HEALTHY, 1000)
+    return StackEstimate(values, deviations, np.eye(len(of)), {"position_m": 1.0}, 1, HEALTHY, 1000, delay=0.0)
 
 
 @NUMBERS.case()
