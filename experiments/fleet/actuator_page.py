@@ -47,6 +47,7 @@ DATE = "date"
 MOST_LOGS = 30
 """Number of latest logs that are listed [count]."""
 
+EXACT = Column("exact", "90 % if the rig file is exact", words=whole_dates)
 FORECASTS = (
     "severity",
     Column("level", "level of the trend, 95 % interval", words=whole_dates),
@@ -54,6 +55,7 @@ FORECASTS = (
     Column("growth", "growth per log"),
     Column("half", "limit reached, 50 % interval", words=whole_dates),
     Column("most", "limit reached, 90 % interval", words=whole_dates),
+    EXACT,
     Column("outlook", words=whole_dates),
 )
 LOGS = (
@@ -84,6 +86,7 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
     counted = max((len(one.logs) for one in outlooks), default=0)
     charts = _charts(outlooks, row.name)
     last = [*row.logs][-MOST_LOGS:][::-1]
+    with_rig = any(one.has_common_error for one in outlooks)
     facts = {
         "name": row.name,
         "title": f"{row.name}: {STATES[row.state]}{f' ({finding_text(row.last)})' if row.last.between else ''}.",
@@ -111,9 +114,11 @@ def actuator_page(row: ActuatorRow, pages: Mapping[str, str], fleet: str = "../i
         "captions": [caption for caption, _ in charts],
         "began": _restarts(outlooks, row.maintained),
         "counted": counted,
+        "with_rig": with_rig,
         "left_out": len(row.logs) - counted,
     }
-    return render_page("fleet/actuator.html", facts, {"forecasts": FORECASTS, "logs": LOGS}, {})
+    columns = [one for one in FORECASTS if with_rig or one is not EXACT]
+    return render_page("fleet/actuator.html", facts, {"forecasts": columns, "logs": LOGS}, {})
 
 
 def _restarts(outlooks: Sequence[Outlook], maintained: Sequence[float]) -> list[str]:
@@ -176,8 +181,9 @@ def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
         "level": f"{shown} {unit} ({low} to {high}){_as_of(one, newest)}",
         "limit": f"{number(scale * one.series.limit, 3)} {unit}",
         "growth": f"{fixed(growth, places)}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}{fixed(growth_std, places)} {unit}",
-        "half": REACHED if one.past else one.when(1, 3) or MISSING,
-        "most": REACHED if one.past else one.when(0, 4) or MISSING,
+        "half": REACHED if one.past else one.when(1, 3, total=True) or MISSING,
+        "most": REACHED if one.past else one.when(0, 4, total=True) or MISSING,
+        **({"exact": REACHED if one.past else one.when(0, 4) or MISSING} if one.has_common_error else {}),
         "outlook": f"{one.words}{one.doubt}",
     }
 

@@ -55,6 +55,24 @@ class Outlook:
         return None if self.quantiles is None else (self.quantiles[0], self.quantiles[2], self.quantiles[4])
 
     @property
+    def has_common_error(self) -> bool:
+        """Whether the rig file's error is known."""
+        return self.series.common is not None
+
+    @cached_property
+    def total_quantiles(self) -> tuple[float, ...] | None:
+        """Logs until the limit is crossed with the rig file's error [step]; None before `FEWEST` logs of the stretch.
+
+        The median is that without it, and each interval contains that without it.
+        """
+        own, total = self.trend.crossing, self.trend.total_crossing
+        if own is None or total is None:
+            return None
+        pairs = zip((min, min, min, max, max), own.quantiles, total.quantiles, strict=True)
+        found = [float(pick(one, other)) for pick, one, other in pairs]
+        return (*found[:2], float(own.quantiles[2]), *found[3:])
+
+    @property
     def alarm(self) -> bool:
         """Whether there is an alarm after the last log."""
         return self.trend.alarm
@@ -87,17 +105,20 @@ class Outlook:
             return ""
         return "; its trend is still within it: log again to see whether this lasts"
 
-    def when(self, low: int, high: int) -> str:
+    def when(self, low: int, high: int, *, total: bool = False) -> str:
         """Return when the limit is reached, between two of `QUANTILES`: as dates if logs have them, else in logs.
 
         Parameters
         ----------
         low, high : int
             Indices into `QUANTILES` [index].
+        total : bool
+            Whether with the rig file's error.
         """
         if self.trend.crossing is None:
             return ""
-        ends = [float(self.trend.crossing.quantiles[place]) for place in (low, high)]
+        quantiles = (total and self.total_quantiles) or self.trend.crossing.quantiles.tolist()
+        ends = [quantiles[place] for place in (low, high)]
         if ends[1] <= 0.0:
             return REACHED
         growth, std = self.trend.growth
@@ -110,7 +131,7 @@ class Outlook:
         places = [(self.logs[-1].named.place or 0.0) + self.days_apart * end for end in ends]
         if low != high:
             return date_interval_text(places, ahead)
-        farthest = self.days_apart * float(self.trend.crossing.quantiles[-1])
+        farthest = self.days_apart * quantiles[-1]
         return date_text(places[0], max(ahead[0], min(farthest, HOURS)))  # no hour if the interval is one of days
 
     @property
@@ -126,7 +147,7 @@ class Outlook:
             return "growing" if self.trend.certain else "no certain growth"
         if self.left[1] <= 0.0:
             return "the trend is past the limit"
-        middle, ends = self.when(2, 2), self.when(0, 4).removesuffix(" logs")
+        middle, ends = self.when(2, 2), self.when(0, 4, total=True).removesuffix(" logs")
         around = "" if middle == ends else f" ({ends})"
         return f"limit {'in ' if self.days_apart is None else ''}{middle}{around}"
 
@@ -135,14 +156,15 @@ class Outlook:
         """The forecast in one sentence for the page of the actuator, without a full stop."""
         if self.past or self.left is None or self.left[1] <= 0.0 or len(self.logs) - self.trend.begin < FEWEST:
             return f": {self.words}{self.doubt}"
-        low, middle, high = self.left
+        middle = self.left[1]
+        exact = f"; 90 % if the rig file is exact: {self.when(0, 4)}" if self.has_common_error else ""
         logs = (
             f"in about {middle:.0f} log{'' if round(middle) == 1 else 's'}" if middle >= 1.0 else "before the next log"
         )
         if self.days_apart is None:
-            half = self.when(1, 3).removesuffix(" logs")
-            return f" reaches its limit {logs} (50 % interval: {half} logs; 90 %: {span_of(low, high)} logs)"
-        ends = f"50 % interval: {self.when(1, 3)}; 90 %: {self.when(0, 4)}"
+            half = self.when(1, 3, total=True).removesuffix(" logs")
+            return f" reaches its limit {logs} (50 % interval: {half} logs; 90 %: {self.when(0, 4, total=True)}{exact})"
+        ends = f"50 % interval: {self.when(1, 3, total=True)}; 90 %: {self.when(0, 4, total=True)}{exact}"
         return f" reaches its limit {logs}: {self.when(2, 2)} ({ends})"
 
 
@@ -196,6 +218,7 @@ def outlook_of(logs: Sequence[LogRow], name: str, maintained: Sequence[float] = 
         last.healthy,
         last.limit,
         tuple(maintained) if dated else (),
+        np.array([one.common for one in amounts]) if any(one.total for one in amounts) else None,
     )
     return Outlook(name, last.unit, told, series)
 

@@ -37,6 +37,8 @@ class Amount:
         Estimate and 95 % interval [unit].
     healthy, limit : float
         Value of a healthy actuator, and value at which it stops being sound [unit].
+    total : tuple of float
+        95 % interval with the rig file's error [unit]; empty if it is unknown.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Amount:
     high: float
     healthy: float
     limit: float
+    total: tuple[float, ...] = ()
 
     @property
     def share(self) -> float:
@@ -56,6 +59,17 @@ class Amount:
     def std(self) -> float:
         """Standard deviation, which assumes a normal interval [unit]."""
         return 0.5 * (self.high - self.low) / NORMAL_95
+
+    @property
+    def common(self) -> tuple[float, float]:
+        """Standard deviations of the rig file's error, below and above: it is the same in all logs [unit]."""
+        if not self.total:
+            return 0.0, 0.0
+        squares = [
+            (end - self.value) ** 2 - (own - self.value) ** 2
+            for end, own in zip(self.total, (self.low, self.high), strict=True)
+        ]
+        return math.sqrt(max(squares[0], 0.0)) / NORMAL_95, math.sqrt(max(squares[1], 0.0)) / NORMAL_95
 
     @property
     def state(self) -> str:
@@ -70,8 +84,8 @@ class Amount:
         return "open" if high > limit else "within"
 
 
-AMOUNT_NUMBERS = len(fields(Amount)) - 2
-"""Numbers of an `Amount`, which has a name and a unit besides [count]."""
+AMOUNT_NUMBERS = len(fields(Amount)) - 3
+"""Numbers that every `Amount` has, besides name, unit and total interval [count]."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +186,8 @@ def _amounts(text: str | None, limits: Mapping[str, float]) -> dict[str, Amount]
         told = [one["value"], *(one["ci95"] or ()), one.get("healthy"), limit]
         numbers = [float(number) for number in told if number is not None and math.isfinite(number)]
         if len(numbers) == AMOUNT_NUMBERS and limit != one["healthy"]:
-            found[name] = Amount(name, one["unit"], *numbers)
+            total = tuple(float(end) for end in one.get("ci95_total") or () if math.isfinite(end))
+            found[name] = Amount(name, one["unit"], *numbers, total=total if len(total) == len(one["ci95"]) else ())
     return found
 
 

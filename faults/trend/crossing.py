@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from faults.trend.kalman import Belief, Settings, exponential_growth
 from faults.trend.kalman_loops import Index
@@ -55,8 +56,27 @@ class Crossing:
         return float(np.mean(self.steps <= steps))
 
 
+def shared_shifts(below: float, above: float, rng: np.random.Generator) -> Array:
+    """Return an error that is common to all logs of an actuator, such as that of its rig file, one for each future.
+
+    Parameters
+    ----------
+    below, above : float
+        Standard deviation of the true level below and above what the logs tell [dimensionless].
+    rng : numpy.random.Generator
+        Source of their order.
+
+    Returns
+    -------
+    ndarray, shape (draws,)
+        True level less what the logs tell: quantiles of both halves of a normal distribution, in any order.
+    """
+    normal = rng.permutation(ndtri((np.arange(DRAWS) + 0.5) / DRAWS))
+    return np.where(normal < 0.0, below, above) * normal
+
+
 def crossing(
-    belief: Belief, grid: Settings, rng: np.random.Generator, limit: float = 1.0, resting: float = 0.0
+    belief: Belief, grid: Settings, rng: np.random.Generator, limit: "float | Array" = 1.0, resting: float = 0.0
 ) -> Crossing:
     """Return when the level first reaches the limit.
 
@@ -68,8 +88,8 @@ def crossing(
         The settings of the belief.
     rng : numpy.random.Generator
         Source of the futures.
-    limit : float
-        The limit [dimensionless].
+    limit : float or ndarray, shape (draws,)
+        The limit, of all futures or of each [dimensionless].
     resting : float
         Share of the futures that do not grow, whatever their setting: a jump looks like growth [probability].
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from faults.trend.changes import stretches
-from faults.trend.crossing import Crossing, crossing
+from faults.trend.crossing import Crossing, crossing, shared_shifts
 from faults.trend.kalman import Belief, moments, settings
 from faults.trend.rest import growth_evidence, jumped_share, rest_evidence
 from plant.arrays import Array
@@ -39,6 +39,9 @@ class Series:
         Value of the healthy actuator, and the limit [the severity's unit].
     maintained : tuple of float
         Times of repairs [unit of the times].
+    common : ndarray, shape (n, 2)
+        Standard deviation of an error that all logs share, such as that of the rig file, towards smaller and larger
+        true values [the severity's unit]. By default there is none.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class Series:
     healthy: float
     limit: float
     maintained: tuple[float, ...] = ()
+    common: Array | None = None
 
     def __post_init__(self) -> None:
         if not len(self.values) or np.any(np.diff(self.times) < 0.0) or self.limit == self.healthy:
@@ -129,6 +133,25 @@ class Trend:
     def crossing(self) -> Crossing | None:
         """When the limit is reached; None before `FEWEST` logs of the stretch."""
         return None if self._short else self._future
+
+    @cached_property
+    def total_crossing(self) -> Crossing | None:
+        """The same with the error that all logs share: the limit is met early or late in all futures of a shift."""
+        below, above = self._common
+        if self._short or not below + above > 0.0:
+            return self.crossing
+        resting = jumped_share(self.belief, settings(), self.rest)
+        shifts = shared_shifts(below, above, np.random.default_rng((self.place, 1)))
+        return crossing(self.belief, settings(), np.random.default_rng(self.place), 1.0 - shifts, resting)
+
+    @property
+    def _common(self) -> tuple[float, float]:
+        """Deviations of the shared error of the last logs below and above, healthy at 0 and the limit at 1."""
+        if self.series.common is None:
+            return 0.0, 0.0
+        usual = np.median(self.series.common[max(self.begin, self.place + 1 - FEWEST) : self.place + 1], axis=0)
+        low, high = (usual / abs(self.series.size)).tolist()
+        return (low, high) if self.series.size > 0.0 else (high, low)
 
     @property
     def certain(self) -> bool:

@@ -217,3 +217,42 @@ def test_an_unordered_or_empty_series_or_one_without_a_limit_is_refused(changes:
     good = Series(np.arange(2.0), np.zeros(2), np.ones(2), 0.0, 1.0)
     with pytest.raises(ValueError, match="a series needs logs in the order of time"):
         replace(good, **changes)  # pyright: ignore[reportArgumentType]
+
+
+def total_of(series: Series, common: Array | None) -> tuple[Array, Array]:
+    """Return the crossing time's quantiles without an error that all logs share, and with it."""
+    found = last_trend(replace(series, common=common))
+    assert found.crossing is not None
+    assert found.total_crossing is not None
+    return found.crossing.quantiles, found.total_crossing.quantiles
+
+
+def test_an_error_that_all_logs_share_widens_the_interval_of_the_crossing_and_leaves_its_median() -> None:
+    series = series_of(growth())
+    own, same = total_of(series, None)
+    assert same == pytest.approx(own)
+    own, wide = total_of(series, np.full((40, 2), 0.1))
+    assert wide[2] == pytest.approx(own[2], abs=1.0)
+    assert wide[0] < own[0] - 2.0  # 1.645 x 0.1 of the distance to the limit is 8 logs at 0.02 a log
+    assert wide[4] > own[4] + 2.0
+
+
+@pytest.mark.parametrize("size", [1.0, -1.0])
+def test_a_shared_error_towards_the_limit_brings_the_crossing_nearer_alone(size: float) -> None:
+    """True values may be larger than the logs tell: early if the severity rises to its limit, late if it falls."""
+    plain = series_of(growth())
+    series = replace(plain, values=size * plain.values, limit=size)
+    own, total = total_of(series, np.tile([0.0, 0.15], (40, 1)))
+    moved = total - own
+    assert (moved[0] < -2.0, moved[4] > 2.0) == ((True, False) if size > 0.0 else (False, True))
+
+
+def test_intervals_with_the_shared_error_cover_where_those_without_it_do_not() -> None:
+    rng = np.random.default_rng(11)
+    covered = np.zeros(2)
+    for seed in range(40):
+        shift = 0.25 * rng.standard_normal()
+        found = total_of(series_of(growth() - shift, 0.02, seed), np.full((40, 2), 0.25))
+        covered += [ends[0] <= 50.0 - 39.0 <= ends[4] for ends in found]
+    assert covered[0] < 0.75 * 40
+    assert covered[1] >= 0.85 * 40
