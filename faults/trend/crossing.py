@@ -1,9 +1,10 @@
 """When a limit is crossed: by Monte Carlo from the current belief, with settings drawn by their weight."""
 
 from dataclasses import dataclass
+from functools import cache
+from statistics import NormalDist
 
 import numpy as np
-from scipy.special import ndtri
 
 from faults.trend.kalman import Belief, Settings, exponential_growth
 from faults.trend.kalman_loops import Index
@@ -71,8 +72,13 @@ def shared_shifts(below: float, above: float, rng: np.random.Generator) -> Array
     ndarray, shape (draws,)
         True level less what the logs tell: quantiles of both halves of a normal distribution, in any order.
     """
-    normal = rng.permutation(ndtri((np.arange(DRAWS) + 0.5) / DRAWS))
+    normal = rng.permutation(_normal_quantiles())
     return np.where(normal < 0.0, below, above) * normal
+
+
+@cache
+def _normal_quantiles() -> Array:
+    return np.array([NormalDist().inv_cdf((place + 0.5) / DRAWS) for place in range(DRAWS)])
 
 
 def crossing(
