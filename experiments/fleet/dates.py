@@ -23,6 +23,27 @@ MONTHS = (
     *("July", "August", "September", "October", "November", "December"),
 )
 
+DAY_IN_WORDS = re.compile(
+    r"(?<![A-Za-z0-9-])(?P<day>0?[1-9]|[12]\d|3[01])(?P<between>[-_. ]?)"
+    rf"(?P<month>{'|'.join(f'{name[:3]}(?:{name[3:]})?' for name in MONTHS)})"
+    r"(?P=between)(?P<year>(?:19|20)\d\d)(?![0-9])",
+    re.IGNORECASE,
+)
+"""A date with its month in English, such as 22-Nov-2026. Behind a letter or a hyphen the number may belong to the
+actuator: P-12-Nov-2026."""
+
+DAY_IN_SIGNS = re.compile(
+    r"(?<![0-9])(?P<year>(?:19|20)\d\d)[年년] ?(?P<month>0?[1-9]|1[0-2])[月월] ?(?P<day>[12]\d|3[01]|0?[1-9])[日号號일]"
+    r"(?:[ _T-]?(?P<hour>2[0-3]|[01]?\d)[时時点點시] ?(?P<minute>[0-5]?\d)[分분](?: ?(?P<second>[0-5]?\d)[秒초])?)?"
+)
+"""A date as it is written in Chinese, Japanese or Korean, with or without a time."""
+
+WRITTEN = (
+    r"\d{1,2}[-_. ]?[A-Za-z]{3,9}[-_. ]?\d{4}(?:[T _-]\d\d[-_.:]?\d\d(?:[-_.:]?\d\d)?)?"
+    r"|\d{4}[年년][ \d]+[月월][ \d]+[日号號일](?:[ _T\d]+[时時点點시][ \d]+[分분](?:[ \d]+[秒초])?)?"
+)
+"""What a date with words or signs may look like in a pattern; `year_first` reads it."""
+
 LONGEST_GAP_DAYS = 1000.0
 """Longest time between two logs of a fleet [day]. If a gap is longer, the smaller group of logs has a wrong date."""
 
@@ -41,14 +62,27 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def year_first(text: str) -> str:
-    """Return a text in which each day-first date is rewritten as year, month, day.
+    """Return a text in which each date of another form is rewritten as year, month, day.
 
     Examples
     --------
     >>> year_first("P-12_22.11.2026"), year_first("P-12_2026-11-22")
     ('P-12_2026-11-22', 'P-12_2026-11-22')
+    >>> year_first("P-12_22-Nov-2026"), year_first("P-12_2026年11月2日8时05分")
+    ('P-12_2026-11-22', 'P-12_2026-11-02T08-05')
     """
-    return DAY_FIRST.sub(r"\g<year>-\g<month>-\g<day>", text)
+    for form in (DAY_FIRST, DAY_IN_WORDS, DAY_IN_SIGNS):
+        text = form.sub(_iso_date, text)
+    return text
+
+
+def _iso_date(found: re.Match[str]) -> str:
+    parts = found.groupdict()
+    month = parts["month"]
+    number = int(month) if month.isdigit() else [name[:3].lower() for name in MONTHS].index(month[:3].lower()) + 1
+    day = f"{parts['year']}-{number:02d}-{int(parts['day']):02d}"
+    time = [f"{int(parts[name]):02d}" for name in ("hour", "minute", "second") if parts.get(name)]
+    return f"{day}T{'-'.join(time)}" if time else day
 
 
 def without_wrong_clocks(named: "Mapping[str, ActuatorAndDate]") -> "dict[str, ActuatorAndDate]":

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from experiments.fleet.dates import without_wrong_clocks, year_first
+from experiments.fleet.dates import WRITTEN, without_wrong_clocks, year_first
 from experiments.fleet.folders import apart_by_folder
+from experiments.fleet.one_form import one_form
 from plant.errors import HydrostateError
 
 STAMP = re.compile(
@@ -23,7 +24,7 @@ STAMP = re.compile(
 CALENDAR = rf"{STAMP.pattern}|\d{{4}}-.*"
 """A calendar date, in the forms that `place_of` reads."""
 
-FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": r"(?P<date>[0-9][0-9T:.+\-Z]*)"}
+FIELDS: Mapping[str, str] = {"actuator": r"(?P<actuator>.+)", "date": rf"(?P<date>{WRITTEN}|[0-9][0-9T:.+\-Z]*)"}
 """Fields allowed in a pattern, and what each matches."""
 
 NO_ACTUATOR = ("bench", "capture", "data", "export", "file", "log", "measurement", "record", "run", "scope", "test")
@@ -155,7 +156,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]
     >>> by_pattern(["logs/P-12_2026-11-22.csv"], "{actuator}_{date}.csv")["logs/P-12_2026-11-22.csv"].actuator
     'P-12'
     """
-    parts = re.split(r"(\{[^}]*\}|\*)", pattern)
+    parts = re.split(r"(\{[^}]*\}|\*)", one_form(pattern))
     named = [part[1:-1] for part in parts if part.startswith("{")]
     if "actuator" not in named or set(named) - set(FIELDS) or len(named) != len(set(named)):
         raise HydrostateError(
@@ -168,7 +169,7 @@ def by_pattern(files: Iterable[str], pattern: str) -> dict[str, ActuatorAndDate]
     found: dict[str, ActuatorAndDate] = {}
     folders: dict[str, str] = {}
     for file in files:
-        path = file.replace("\\", "/")
+        path = one_form(file.replace("\\", "/"))
         match = stamped.match(path) or wanted.match(path)
         if match is None:
             found[file] = UNNAMED
@@ -240,7 +241,7 @@ def actuator_in_name(name: str, pattern: str | None) -> str:
     'P-12'
     """
     if pattern is None:
-        return _by_date(f"/{name}").actuator or _stem(name)
+        return _by_date(f"/{name}").actuator or one_form(_stem(name))
     try:
         return by_pattern([name], pattern)[name].actuator
     except HydrostateError:  # the date in the name is invalid
@@ -249,7 +250,7 @@ def actuator_in_name(name: str, pattern: str | None) -> str:
 
 def _folder_above(file: str, named: ActuatorAndDate) -> str:
     """Return the folder of a log, or the one above if the folder names the actuator."""
-    folder = file.replace("\\", "/").rpartition("/")[0]
+    folder = one_form(file.replace("\\", "/")).rpartition("/")[0]
     above, _, name = f"/{folder}".rpartition("/")
     return above.lstrip("/") if name == named.actuator else folder
 
@@ -261,7 +262,7 @@ def _stem(name: str) -> str:
 
 def _by_date(path: str) -> ActuatorAndDate:
     """Return actuator and date from the names of a file and its folder."""
-    *_, folder, name = path.split("/")
+    *_, folder, name = one_form(path).split("/")
     stem = year_first(_stem(name))
     dates = list(re.finditer(rf"(?<![0-9]){STAMP.pattern}(?![0-9])", stem))
     if len(dates) != 1:
@@ -269,7 +270,7 @@ def _by_date(path: str) -> ActuatorAndDate:
     date = dates[0]
     rest = [part.strip("_-. ") for part in (stem[: date.start()], stem[date.end() :])]
     actuator = "_".join(part for part in rest if part)
-    if re.sub(r"[^a-z]", "", actuator.lower()) in {"", *NO_ACTUATOR} and not re.search(r"\d", actuator):
+    if re.sub(r"[\W_]", "", actuator.lower()) in {"", *NO_ACTUATOR}:
         actuator = folder
     return _actuator_and_date(actuator, date[0], "its name") if actuator else UNNAMED
 
@@ -317,7 +318,8 @@ def by_table(files: Iterable[str], table: Path) -> dict[str, ActuatorAndDate]:
             {row["file"]: _actuator_and_date(row["actuator"], row.get("date") or "", table.name) for row in rows}
         )
     )
-    return {file: said.get(file) or said.get(Path(file).name) or UNNAMED for file in files}
+    known = {file: one_form(file) for file in files}
+    return {file: said.get(one) or said.get(Path(one).name) or UNNAMED for file, one in known.items()}
 
 
 def table_rows(table: Path, wanted: Iterable[str]) -> list[dict[str, str]]:
@@ -332,7 +334,10 @@ def table_rows(table: Path, wanted: Iterable[str]) -> list[dict[str, str]]:
         with table.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
             columns = [name.strip() for name in reader.fieldnames or ()]
-            rows = [{str(name).strip(): (value or "").strip() for name, value in row.items() if name} for row in reader]
+            rows = [
+                {str(name).strip(): one_form((value or "").strip()) for name, value in row.items() if name}
+                for row in reader
+            ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
         raise HydrostateError(f"{table}: must be a CSV table in UTF-8 that can be read: {why}") from error

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.command.options import load_actuator, load_rig
 from experiments.fleet.naming import actuator_in_name
+from experiments.fleet.one_form import one_form
 from plant.errors import HydrostateError
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 def rig_files(folder: Path | None) -> dict[str, Path]:
     """Return the rig files of a folder by actuator; each file is named after its actuator."""
-    return {} if folder is None else {one.stem: one for one in sorted(folder.glob("*.toml"))}
+    return {} if folder is None else {one_form(one.stem): one for one in sorted(folder.glob("*.toml"))}
 
 
 def require_rigs(plant: str | None, rigs: Path | None, others: Path | None) -> None:

@@ -1,5 +1,6 @@
 """Actuator and date of a log, from file names or from a table."""
 
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -180,3 +181,46 @@ def test_a_date_years_away_from_the_others_excludes_its_log() -> None:
 def test_a_gap_of_ten_years_within_a_fleet_does_not_exclude_logs() -> None:
     files = [f"P_{year}-11-{day}.csv" for year in (2016, 2026) for day in range(10, 14)]
     assert {one.actuator for one in by_pattern(files, "{actuator}_{date}.csv").values()} == {"P"}
+
+
+@pytest.mark.parametrize("pattern", [None, "{actuator}_{date}.csv"])
+def test_actuators_named_in_other_alphabets_in_one_folder_stay_apart(pattern: str | None) -> None:
+    """Before, a name without Latin letters and digits was none, and all of a folder were one actuator."""
+    files = [f"logs/{name}_2026-01-0{day}.csv" for name in ("Αντλία", "Άξονας", "泵") for day in (1, 2)]
+    found = by_dates(files) if pattern is None else by_pattern(files, pattern)
+    assert [found[file].actuator for file in files] == ["Αντλία"] * 2 + ["Άξονας"] * 2 + ["泵"] * 2
+
+
+def test_a_name_with_its_accent_apart_as_macos_writes_it_is_the_same_actuator(tmp_path: Path) -> None:
+    together, apart = (unicodedata.normalize(form, "Αντλία-ή") for form in ("NFC", "NFD"))
+    assert together != apart
+    files = [f"{name}_2026-01-0{day}.csv" for name, day in ((together, 1), (apart, 2), (apart, 3))]
+    assert {one.actuator for one in by_dates(files).values()} == {together}
+    assert {one.actuator for one in by_pattern(files, f"{apart[:4]}{{actuator}}_{{date}}.csv").values()} == {
+        together[4:]
+    }
+    table = tmp_path / "names.csv"
+    table.write_text("file,actuator\n" + "".join(f"{together}_2026-01-0{day}.csv,{apart}\n" for day in (1, 2, 3)))
+    assert {one.actuator for one in by_table(files, table).values()} == {together}
+
+
+@pytest.mark.parametrize(
+    ("file", "actuator", "day"),
+    [
+        ("P-12_22-Nov-2026.csv", "P-12", "2026-11-22"),
+        ("P-12_22-Nov-2026 14-30-05.csv", "P-12", "2026-11-22"),
+        ("P-12_5 january 2026.csv", "P-12", "2026-01-05"),
+        ("2号泵_2026年1月5日.csv", "2号泵", "2026-01-05"),
+        ("2号泵_2026年11月12日8时05分.csv", "2号泵", "2026-11-12"),
+        ("펌프_2026년 1월 5일.csv", "펌프", "2026-01-05"),
+    ],
+)
+def test_dates_with_the_name_of_a_month_or_with_signs_are_read(file: str, actuator: str, day: str) -> None:
+    other = file.replace("2026", "2027")
+    for found in (by_dates([file, other])[file], by_pattern([file], "{actuator}_{date}.csv")[file]):
+        assert (found.actuator, found.day) == (actuator, day)
+        assert found.has_calendar_date
+
+
+def test_a_number_behind_a_hyphen_is_the_actuator_s_and_no_day_of_a_month() -> None:
+    assert by_dates(["P-12-Nov-2026.csv", "P-13-Nov-2026.csv", "P-12-Dec-2026.csv"]) == {}

@@ -1,6 +1,7 @@
 """Which rig file a log uses on a server; a log without one gets no wrong numbers."""
 
 import os
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -166,3 +167,10 @@ def test_a_served_fleet_without_verdicts_hints_at_the_option_rigs() -> None:
     row = {"outcome": "mismatch", "reason": "no model fits"}
     page = fleet_view([(str(k) * 16, f"P-{k}.csv", row) for k in range(4)], None, {}, {}, "here")
     assert "start the server with --rigs FOLDER" in page
+
+
+def test_a_rig_file_named_on_macos_is_found_by_the_actuator_of_a_log_named_elsewhere(tmp_path: Path) -> None:
+    """Before, a log of that actuator was taken with the rig file of all others, which gave wrong numbers."""
+    own, others = tmp_path / f"{unicodedata.normalize('NFD', 'Αντλία-ή')}.toml", tmp_path / "others" / "rig.toml"
+    own.write_text("")
+    assert rig_of(f"{unicodedata.normalize('NFC', 'Αντλία-ή')}_2026-11-22.csv", None, tmp_path, others) == own
