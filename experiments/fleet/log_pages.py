@@ -26,10 +26,10 @@ def file_name(name: str) -> str:
     Examples
     --------
     >>> file_name("hall 3/P-12.csv")
-    'P-12.csv-2a1d83.html'
+    'P-12.csv-2a1d83a787f9.html'
     """
     plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name.rsplit("/", 1)[-1])[:60].strip(".") or "log"
-    return f"{plain}-{sha256(name.encode()).hexdigest()[:6]}.html"
+    return f"{plain}-{sha256(name.encode()).hexdigest()[:12]}.html"
 
 
 def write_pages(

@@ -215,7 +215,8 @@ def test_pages_are_written_for_the_sickest_that_can_be_read(tmp_path: Path) -> N
 def test_names_of_pages_are_safe_and_differ() -> None:
     names = {file_name(one) for one in ("a b/../c.csv", "c.csv", "", "x" * 300, "ü/é.csv")}
     assert len(names) == 5
-    assert all(one.isascii() and "/" not in one and len(one) < 80 for one in names)
+    assert all(one.isascii() and "/" not in one and len(one) < 90 for one in names)
+    assert len({file_name(f"{place}/run.csv") for place in range(20000)}) == 20000
 
 
 @pytest.fixture(scope="module")
