@@ -9,6 +9,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.choose import STRUCTURES, choose_model
 from estimation.identification.design.sticking import is_sticking, rest_shares
+from estimation.identification.fit.answer_at_once import at_once_note
 from estimation.identification.fit.feedback import FEEDBACK_SAMPLES, feedback_note
 from estimation.identification.fit.fitted import CovarianceKind
 from estimation.identification.free_run.from_records import without_gaps
@@ -167,7 +168,7 @@ def _warn_of_feedback(model: LinearModel, u: Array, y: Array) -> None:
     if not model.is_stable:
         return
     residual = y[part] - model.simulate(u[part], initial=model.initial_state)
-    said = feedback_note(residual, u[part], (model.input_name, model.output_name))
+    said = at_once_note(model, u, y) or feedback_note(residual, u[part], (model.input_name, model.output_name))
     if said is not None:
         warnings.warn(LogWarning(said), stacklevel=3)
 

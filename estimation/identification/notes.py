@@ -15,6 +15,12 @@ class IdentificationCode(Code):
         "input {input!r} follows the noise of {output!r} (p = {p_value:.1g}): the data seem to come from a closed loop,"
         " where output error is biased; name the column that drives the loop (--reference), or fit ARMAX or Box-Jenkins"
     )
+    FEEDBACK_AT_ONCE = (
+        "{output!r} moves against its gain in the very sample in which {input!r} moves (p = {p_value:.1g}): the data "
+        "seem to come from a closed loop whose controller computes {input!r} from {output!r} of the same row. Output "
+        "error is biased there, and so is every structure without a delay: name the column that drives the loop "
+        "(--reference), or fit --structure box-jenkins --delay 1"
+    )
     SWAPPED = (
         "{input!r} seems to answer {output!r}, not the other way round (a model in that direction leaves {back:.0%} of "
         "the deviation, this one {left:.0%}): exchange --input and --output; if they are right, a controller computes "
@@ -191,6 +197,9 @@ GAIN_MEANS_NOTHING = frozenset(
 )
 """Notes by which a steady gain must not be used."""
 
+CLOSED_LOOP = frozenset({IdentificationCode.FEEDBACK, IdentificationCode.FEEDBACK_AT_ONCE})
+"""Notes by which a controller answers the output's noise."""
+
 UNRELIABLE = frozenset({IdentificationCode.SWAPPED, IdentificationCode.WALK_FOLLOWED, IdentificationCode.ANSWERS_LATE})
 """Notes by which a model is not to be relied on, whatever else is told of it."""
 
@@ -205,6 +214,7 @@ RAISED_AS_WARNINGS = (
     IdentificationCode.OUTPUT_STOPPED,
     IdentificationCode.OUTPUT_AT_END,
     IdentificationCode.FEEDBACK,
+    IdentificationCode.FEEDBACK_AT_ONCE,
     IdentificationCode.NOISE_ASSUMED,
     IdentificationCode.SWAPPED,
     IdentificationCode.INPUT_LOGGED_LATE,

@@ -12,7 +12,7 @@ from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.linear_comparison import LinearComparison
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
-from estimation.identification.notes import IdentificationCode
+from estimation.identification.notes import CLOSED_LOOP, IdentificationCode
 
 CORRECTED = (LinearDynamics, PolynomialDynamics, HammersteinDynamics)
 """Dynamics whose error is modelled: an output with limits or without a sign would leave them."""
@@ -46,7 +46,7 @@ def _with_error_model(found: Identified, data: Channels) -> Identified:
     nonlinear one, the error is not that model's.
     """
     model = found.model
-    fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
+    fed = any(note.code in CLOSED_LOOP for note in found.notes)
     if type(model.dynamics) not in CORRECTED or not found.sound or fed:
         return found
     part, by = liveliest_sections(in_scale(data, model.scaling), MOST_MODELLED), model.scaling

@@ -57,7 +57,7 @@ from estimation.identification.free_run.polynomial_dynamics import PolynomialDyn
 from estimation.identification.free_run.random_walk import identified_walk, walk_followed_notes, walk_model
 from estimation.identification.free_run.trend import detrended
 from estimation.identification.free_run.unrelated import bend_explains, polynomial_explains
-from estimation.identification.notes import RAISED_AS_WARNINGS, IdentificationCode
+from estimation.identification.notes import CLOSED_LOOP, RAISED_AS_WARNINGS, IdentificationCode
 from plant.errors import HydrostateError, LogWarning, require_known
 from plant.notes import Note
 
@@ -135,7 +135,7 @@ def _with_doubts(found: Identified, data: Channels, structure: str, *, looked_fo
     if structure == "auto" and found.model.structure != "output-error":
         notes += wandering_notes(found.model, data)
     doubtful, walks = bool(notes), any(note.code == IdentificationCode.RANDOM_WALK for note in found.notes)
-    fed = any(note.code == IdentificationCode.FEEDBACK for note in found.notes)
+    fed = any(note.code in CLOSED_LOOP for note in found.notes)
     if structure == "output-error" and found.sound and not (doubtful or walks or fed):
         notes += residual_notes(found.model, data)
         # a model without a sign replaces an unreliable linear one, so it must not leave more than noise
@@ -153,10 +153,11 @@ def _identified(
     asked = RequestedSizes(order, delay, n_numerator)
     task = Task(data, whole, by, liveliest_sections(whole, MOST_CHOSEN), asked, orders, delays)
     given = structure in ("output-error", "auto")
-    walk = _identified_from_changes(task) if given else None
+    walk, closed = _identified_from_changes(task) if given else (None, [])
     if walk is not None and structure == "output-error":
         return walk
     linear = linear_comparison(task)
+    linear.notes.extend(closed)
     if walk is not None:
         return _clearly_better_nonlinear(walk, linear, structure)
     if given and (apart := _identified_at_other_levels(task, linear)) is not None:
@@ -182,14 +183,15 @@ def _identified(
     return likelier_with_error_model(found, linear) if structure == "auto" else found
 
 
-def _identified_from_changes(task: Task) -> Identified | None:
-    """Return the linear model of an output with a random walk; None if it has none."""
+def _identified_from_changes(task: Task) -> tuple[Identified | None, list[Note]]:
+    """Return the linear model of an output with a random walk, None if it has none; and notes on a closed loop."""
     walk, free = walk_model(task.whole, task.part, task.orders, task.delays, task.asked.n_numerator), task.free
     if walk is not None and free is not None and walk_model(free.whole, free.part, free.orders, None, None) is None:
-        return None
+        return None, []
     found = None if walk is None else identified_walk(walk, task.data, task.by)
     # a controller that responds to the output's noise biases a fit of changes more than one of levels
-    return None if found is None or closed_loop_notes(found.model, task.data, changes=True) else found
+    closed = [] if found is None else closed_loop_notes(found.model, task.data, changes=True)
+    return None if closed else found, closed
 
 
 def _identified_at_other_levels(task: Task, linear: LinearComparison) -> tuple[Identified, float] | None:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.identification.fit.answer_at_once import at_once_note
 from estimation.identification.fit.feedback import feedback_note
 from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.candidate_rows import linear_row
@@ -127,7 +128,8 @@ class LinearComparison:
         named = data.inputs, data.output, data.sample_time, "output-error"
         model = FreeRunModel(*named, by, LinearDynamics.of(fit), transfer)
         quality = model.quality(data.u, data.y)
-        notes = [*self.notes, *closed_loop_notes(model, data)]
+        known = {note.code for note in self.notes}
+        notes = [*self.notes, *(one for one in closed_loop_notes(model, data) if one.code not in known)]
         ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE)
         sound = self.sound and not any(note.code in ahead for note in notes)
         if best.doubt == "no_fit" or not quality.fit_percent > 0.0 or not best.held_back < 1.0:
@@ -162,6 +164,8 @@ def _highest_order_notes(candidates: list[Candidate], best: Candidate, task: Tas
 def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
     """Return a note if the input of a linear model follows the output's noise, in the longest log.
 
+    A controller that answers within one sample is named as such, as a noise model without a delay is biased there too.
+
     Parameters
     ----------
     model : FreeRunModel
@@ -179,6 +183,8 @@ def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = Fa
     if changes:
         left, followed = np.diff(left), np.diff(followed)
     said = feedback_note(left, followed, (data.inputs[0], data.output))
+    if model.linear is not None:
+        said = at_once_note(model.linear, u[:, 0], y) or said
     if said is None:
         return []
     return [said if changes else swapped_channels_note(left, data, k) or said]

@@ -74,7 +74,9 @@ def identified_other_structure(structure: str, compared: LinearComparison) -> Id
         notes.append(IdentificationCode.TIME_CONSTANT_BEYOND_RECORD.note(order=best.form.order, **told))
         sound = False
     ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE)
-    closed = [one for one in closed_loop_notes(model, data) if structure not in NOISE_MODELS or one.code in ahead]
+    held = structure in NOISE_MODELS  # in a closed loop, as far as it has a delay
+    shared = (*ahead, *(() if best.form.delays[0] else (IdentificationCode.FEEDBACK_AT_ONCE,)))
+    closed = [one for one in closed_loop_notes(model, data) if not held or one.code in shared]
     sound &= not any(note.code in ahead for note in closed)
     notes += closed
     if structure in NOISE_MODELS and not notes:

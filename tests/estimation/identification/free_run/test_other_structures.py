@@ -60,4 +60,4 @@ def test_instrumental_variables_warn_of_a_closed_loop_as_output_error_does() -> 
     data = channels_from([u[:, None]], [x + noise], 0.01, ["u"], "y")
     with pytest.warns(LogWarning, match="closed loop"):
         found = identify_channels(data, structure="instrumental", order=1, delay=1)
-    assert IdentificationCode.FEEDBACK in {note.code for note in found.notes}
+    assert IdentificationCode.FEEDBACK_AT_ONCE in {note.code for note in found.notes}
