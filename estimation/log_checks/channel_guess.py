@@ -17,11 +17,12 @@ from estimation.log_checks.channel_names import POSITION, PRESSURE, SPEED, VELOC
 from estimation.log_checks.notes import GuessCode
 from plant.eha.model import EhaParameters
 from plant.log.clock.stamps import seconds_from_first
+from plant.log.clock.time_unit import usual_units
 from plant.log.columns import CHANNELS, TIME, UNITS
 from plant.log.guess import Guess, best_guesses, points_by_name
 from plant.log.headings import Heading
 from plant.log.inspection import clock_facts
-from plant.log.plausibility import LIMITS, SAMPLE_TIME_RANGE
+from plant.log.plausibility import LIMITS
 from plant.log.scale import conversion_of
 from plant.notes import Note
 
@@ -334,8 +335,7 @@ def _usual_units(channel: str, values: Array, p: EhaParameters) -> list[str]:
         return [UNITS[channel]]
     if channel == TIME:
         facts = clock_facts(values)
-        step = 0.0 if facts is None else facts.step
-        return [one for one in CANDIDATES[TIME] if SAMPLE_TIME_RANGE[0] <= step * _factor(one, "s") <= 0.1] or ["s"]
+        return usual_units(values, 0.0 if facts is None else facts.step)
     size = float(np.ptp(present)) if channel == POSITION else float(np.abs(present).max())
     least, most = LIMITS[channel].least, LIMITS[channel].most
     if channel == SPEED:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from plant.arrays import Array
+from plant.log.plausibility import SAMPLE_TIME_RANGE
 
 _UNITS = (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("d", 86_400.0))
 
@@ -28,6 +29,16 @@ STEP_RANGE = (1e-6, 10.0)
 
 USUAL_STEP = 1e-3
 """Step that logs of hydraulics usually have [s]; of two units that with the nearer step is likely."""
+
+ROUNDING = 1e-6
+"""Relative error of a step between times that were rounded [fraction]."""
+
+SHORTEST_LOG, FRACTIONS = 1.0, (0.01, 0.5)
+"""Duration of a log below which it is unusual [s], and steps that are rather of seconds than of milliseconds then, as
+these are mostly whole numbers [unit of the column]; judged."""
+
+LONGEST_USUAL_STEP = 0.1
+"""Step of a log up to which a unit that no file states is usual [s]; judged."""
 
 
 def unit_of_dates(values: Array) -> tuple[str, str] | None:
@@ -61,6 +72,8 @@ def unit_of_dates(values: Array) -> tuple[str, str] | None:
 def likely_unit(values: Array) -> str | None:
     """Return the unit that gives the most usual steps of a log; None if there are no steps.
 
+    Fractions of a unit, as 0.0, 0.1, 0.2, are seconds rather than milliseconds of a very short log.
+
     Parameters
     ----------
     values : ndarray, shape (n,)
@@ -70,11 +83,53 @@ def likely_unit(values: Array) -> str | None:
     --------
     >>> likely_unit(np.arange(9.0)), likely_unit(1e-3 * np.arange(9.0)), likely_unit(500.0 * np.arange(9.0))
     ('ms', 's', 'us')
+    >>> likely_unit(0.1 * np.arange(600.0)), likely_unit(0.1 * np.arange(60_000.0))
+    ('s', 'ms')
     """
     step = _usual_step(values)
     if not step > 0.0:
         return None
+    if are_seconds(values):
+        return "s"
     return min(_UNITS, key=lambda one: abs(float(np.log(step * one[1] / USUAL_STEP))))[0]
+
+
+def are_seconds(values: Array) -> bool:
+    """Return whether times rise by fractions of a second, and would end within a second if they were milliseconds.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A column of time [unknown unit].
+
+    Examples
+    --------
+    >>> are_seconds(0.2 * np.arange(600.0)), are_seconds(0.2 * np.arange(60_000.0)), are_seconds(np.arange(600.0))
+    (True, False, False)
+    """
+    step, there = _usual_step(values) / (1.0 + ROUNDING), values[np.isfinite(values)]
+    return FRACTIONS[0] <= step <= FRACTIONS[1] and float(np.ptp(there)) < 1e3 * SHORTEST_LOG
+
+
+def usual_units(values: Array, step: float) -> list[str]:
+    """Return the units among s, ms and us in which a time has a usual step, the likeliest first; s if there is none.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        A column of time [unknown unit].
+    step : float
+        Its usual step; zero if there is none [the same].
+
+    Examples
+    --------
+    >>> times = np.arange(600.0)
+    >>> usual_units(0.2 * times, 0.2), usual_units(times, 1.0), usual_units(0.01 * times, 0.01)
+    (['s', 'ms'], ['ms'], ['s', 'ms'])
+    """
+    most = LONGEST_USUAL_STEP * (1.0 + ROUNDING)
+    found = [unit for unit, factor in _UNITS[:3] if SAMPLE_TIME_RANGE[0] <= step * factor <= most]
+    return list(dict.fromkeys(["s", *found] if are_seconds(values) else found)) or ["s"]
 
 
 def _usual_step(values: Array) -> float:
