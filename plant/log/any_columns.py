@@ -13,6 +13,7 @@ from plant.arrays import Array
 from plant.errors import LogError, LogWarning
 from plant.log.checks import Clock, checked_log
 from plant.log.clock.stamps import seconds_from_first
+from plant.log.clock.time_unit import unit_of_dates
 from plant.log.clock.uniform import MOST_MISSING
 from plant.log.columns import TIME, UNITS, Column, list_in_words, named_column, resolve_columns
 from plant.log.formats.detect import open_tables
@@ -21,8 +22,10 @@ from plant.log.lost_values import without_lost
 from plant.log.notes import LogCode
 from plant.log.plausibility import implausibility_notes
 from plant.log.record import Record
+from plant.log.scale import conversion_of
 from plant.log.table import Table
 from plant.notes import Note
+from plant.units import conversion_to, converts
 
 SECONDS: Mapping[str, float] = {
     **dict.fromkeys(("", "s", "sec", "second", "seconds"), 1.0),
@@ -107,7 +110,12 @@ def read_any(
         for note in said:
             warnings.warn(LogWarning(note, source), stacklevel=2)
     clock = None
-    if clock_column is None:
+    if clock_column is not None:
+        heading = headings[clock_column.position]
+        columns[TIME], said = _in_seconds(columns[TIME], clock_column, heading, named=time is not None)
+        for note in said:
+            warnings.warn(LogWarning(note, source), stacklevel=2)
+    else:
         step = sample_time if sample_time is not None else table.step
         if step is None:
             for note in _notes_on_assumed_clock(table, names or (), assumed):
@@ -148,8 +156,11 @@ def time_of(table: Table) -> Array | None:
     >>> time_of(frame_table({"time_ms": [0.0, 20.0], "level": [1.0, 1.1]})).tolist()
     [0.0, 0.02]
     """
-    column = _time_column(headings_of(table.headings))
-    return None if column is None else _seconds(table.numbers(column)[column.position], column)
+    headings = headings_of(table.headings)
+    column = _time_column(headings)
+    if column is None:
+        return None
+    return _in_seconds(table.numbers(column)[column.position], column, headings[column.position])[0]
 
 
 def is_time_name(name: object) -> bool:
@@ -174,9 +185,9 @@ def _table(tables: Sequence[Table], names: Sequence[str] | None) -> Table:
 
 
 def _all_columns(table: Table, headings: Sequence[Heading], time: Column | None) -> dict[str, Array]:
-    """Return every numeric column that has its own name, and the time [s]."""
+    """Return every numeric column that has its own name, and the time as logged."""
     numbers = table.numbers(time)
-    found: dict[str, Array] = {} if time is None else {TIME: _seconds(numbers[time.position], time)}
+    found: dict[str, Array] = {} if time is None else {TIME: numbers[time.position]}
     for place, values in numbers.items():
         name = headings[place].name
         if time is not None and place == time.position:
@@ -189,10 +200,10 @@ def _all_columns(table: Table, headings: Sequence[Heading], time: Column | None)
 def _wanted_columns(
     table: Table, headings: Sequence[Heading], time: Column | None, names: Sequence[str], source: str
 ) -> dict[str, Array]:
-    """Return the wanted columns and the time [s], read together: a row that is skipped in one is skipped in all."""
+    """Return the wanted columns and the time as logged: a row that is skipped in one is skipped in all."""
     chosen = [_column_named(table, headings, name, source) for name in dict.fromkeys(names)]
     raw = table.read(chosen if time is None else [time, *chosen])
-    found: dict[str, Array] = {} if time is None else {TIME: _seconds(raw[time], time)}
+    found: dict[str, Array] = {} if time is None else {TIME: raw[time]}
     for column in chosen:
         if column not in raw or raw[column].dtype.kind == "M":
             raise LogError(f"column {column.name!r} must hold numbers", source)
@@ -254,13 +265,43 @@ def _is_time(heading: Heading) -> bool:
 
 def _time_column(headings: Sequence[Heading]) -> Column | None:
     for place, heading in enumerate(headings):
-        matched = TIME_STEM.fullmatch(heading.stem)
-        if matched is not None or heading.stamped:
-            unit = (matched and matched.group(1)) or heading.unit or ""
-            return Column(place, heading.name, TIME, SECONDS.get(unit.lower(), 1.0))
+        if _is_time(heading):
+            return Column(place, heading.name, TIME, _seconds_in(_unit_of_time(heading)) or 1.0)
     return None
 
 
-def _seconds(values: Any, column: Column) -> Array:
-    """Return time in seconds; dates count from the first one."""
-    return seconds_from_first(values) if values.dtype.kind == "M" else values * column.factor
+def _unit_of_time(heading: Heading) -> str:
+    """Return the unit that a time's name or its file states; empty if they state none."""
+    matched = TIME_STEM.fullmatch(heading.stem)
+    return (matched and matched.group(1)) or heading.unit or ""
+
+
+def _seconds_in(unit: str) -> float | None:
+    """Return what a unit lasts [s]; None for others than those of a time."""
+    known = SECONDS.get(unit.lower())
+    return known if known is not None or not converts(unit, "s") else conversion_to(unit, "s")[0]
+
+
+def _in_seconds(values: Any, column: Column, heading: Heading, *, named: bool = False) -> tuple[Array, list[Note]]:
+    """Return time in seconds, dates from the first one, and notes on a unit that nothing states.
+
+    Parameters
+    ----------
+    named : bool
+        Whether a user names the column: without a unit it is then in seconds, unless it holds dates.
+    """
+    if values.dtype.kind == "M":
+        return seconds_from_first(values), []
+    unit = _unit_of_time(heading)
+    if not unit and column.factor == 1.0:
+        dates = unit_of_dates(values)
+        if dates is not None and dates[0] != "s":
+            said = LogCode.TIME_IS_DATES.note(column=heading.name[:80], unit=dates[0], began=dates[1])
+            return (values - values[np.isfinite(values)][0]) * conversion_of(dates[0], "s")[0], [said]
+    seconds = values * column.factor
+    steps = np.diff(values[np.isfinite(values)])
+    whole = steps.size > 0 and bool((steps >= 1.0).all() and (steps == np.round(steps)).all())
+    if named or (_seconds_in(unit) is not None if unit else not whole):
+        return seconds, []
+    step = float(np.median(steps)) if steps.size else 0.0
+    return seconds, [LogCode.TIME_UNIT_ASSUMED.note(column=heading.name[:80], step_s=step)]

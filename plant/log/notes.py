@@ -56,6 +56,10 @@ class LogCode(Code):
         "taken as evenly spaced"
     )
     TIME_IS_DATES = "column {column!r} has no unit; it was read in {unit}, so the log begins at {began}"
+    TIME_UNIT_ASSUMED = (
+        "column {column!r} states no known unit of time: it was read in s, so its rows are {step_s:g} s apart; if that "
+        "is wrong, name its unit, --columns 'time_s={column}:ms'"
+    )
     TIME_JOINED = "column {column!r} holds whole seconds; column {parts!r} was added to it as the parts of a second"
     SCALE_IN_HEADER = (
         "the file states the scale factor {factor:g} and the offset {offset:g} for column {column!r}, but not whether "

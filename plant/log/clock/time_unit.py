@@ -119,7 +119,7 @@ def usual_units(values: Array, step: float) -> list[str]:
     values : ndarray, shape (n,)
         A column of time [unknown unit].
     step : float
-        Its usual step; zero if there is none [the same].
+        Its usual step; zero if there is none [unknown unit].
 
     Examples
     --------

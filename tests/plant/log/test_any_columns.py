@@ -27,7 +27,7 @@ def test_columns_are_read_in_their_own_units_and_time_is_converted_to_seconds(tm
 
 def test_every_column_of_numbers_is_read_if_none_is_requested(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
-    path.write_text("t,u,note,y\n" + "".join(f"{k},{k * k},text,{-k}\n" for k in range(15)))
+    path.write_text("t_s,u,note,y\n" + "".join(f"{k},{k * k},text,{-k}\n" for k in range(15)))
     assert list(read_any(path)) == ["u", "y"]
 
 
@@ -62,7 +62,7 @@ def test_the_column_of_time_may_be_named_with_its_unit(tmp_path: Path, recwarn: 
 
 
 def test_a_column_that_a_log_has_twice_with_the_same_values_is_one_column(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.csv", "t,x,u,x", RAMP, RAMP**2, RAMP, RAMP**2)
+    path = written(tmp_path / "a.csv", "t_s,x,u,x", RAMP, RAMP**2, RAMP, RAMP**2)
     assert read_any(path, ["x"])["x"][-1] == 361.0
 
 
@@ -124,7 +124,7 @@ def test_the_refusal_of_an_absent_known_channel_names_it(tmp_path: Path) -> None
 
 def test_missing_samples_are_accepted_up_to_the_given_share(tmp_path: Path) -> None:
     keep = np.r_[0:8, 12:20]
-    path = written(tmp_path / "a.csv", "t,u", RAMP[keep], RAMP[keep])
+    path = written(tmp_path / "a.csv", "t_s,u", RAMP[keep], RAMP[keep])
     with pytest.raises(LogError, match="time_s leaves out 4 of 20 samples, wanted at most 5 %"):
         read_any(path, ["u"])
     with pytest.raises(LogError, match="wanted at most 15 %"):
@@ -132,7 +132,7 @@ def test_missing_samples_are_accepted_up_to_the_given_share(tmp_path: Path) -> N
     with pytest.warns(LogWarning, match="u is missing in 4 of 20 samples"):
         record = read_any(path, ["u"], most_missing=0.5)
     assert np.isnan(record["u"][8:12]).all()
-    empty = written(tmp_path / "b.csv", "t,u", RAMP, np.where(RAMP % 7 < 3, np.nan, RAMP))
+    empty = written(tmp_path / "b.csv", "t_s,u", RAMP, np.where(RAMP % 7 < 3, np.nan, RAMP))
     with pytest.raises(LogError, match=r"u is missing in 9 of 20 samples .*, at most 20 % may be"):
         read_any(empty, ["u"], most_missing=0.2)
     with pytest.warns(LogWarning, match="u is missing in 9 of 20"):

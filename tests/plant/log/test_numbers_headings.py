@@ -247,9 +247,7 @@ def columns_of_anything() -> dict[str, Any]:
         "every": list(any_columns._all_columns(table, headings, None)),  # pyright: ignore[reportPrivateUsage]
         "wanted": {name: values[:3] for name, values in wanted.items()},
         "text": or_refused(lambda: any_columns._wanted_columns(table, headings, None, ["note"], "a")),  # pyright: ignore[reportPrivateUsage]
-        "seconds": any_columns._seconds(
-            dates, any_columns._time_column(list(dated.headings)) or any_columns.Column(0, "t", "time_s")
-        ),  # pyright: ignore[reportPrivateUsage]
+        "seconds": any_columns._in_seconds(dates, any_columns.Column(0, "t", "time_s"), dated.headings[0])[0],  # pyright: ignore[reportPrivateUsage]
         "table of most": [any_columns._table((table, dated), names).headings[0].name for names in (None, ["t"], ["X"])],  # pyright: ignore[reportPrivateUsage]
     }
 
