@@ -87,12 +87,14 @@ def at_once_note(model: LinearModel, u: Array, y: Array) -> Note | None:
     """
     part, n_b = slice(0, FEEDBACK_SAMPLES), model.free_numerator.size
     total, spread = float(model.free_numerator.sum()), float(model.covariance[:n_b, :n_b].sum())
+    with np.errstate(divide="ignore", invalid="ignore"):  # a pole at 1 exactly
+        gain, uncertainty = abs(model.dc_gain), model.dc_gain_std
     # where parts cancel only the gain has a sure sign, and where an output integrates only the numerator
-    sure = abs(total) > SURE_SIGN * spread**0.5 or abs(model.dc_gain) > SURE_SIGN * model.dc_gain_std
+    sure = abs(total) > SURE_SIGN * spread**0.5 or gain > SURE_SIGN * uncertainty
     if u[part].size < 8 * DEFAULT_LAGS or not sure:
         return None
     slope, deviation = answer_at_once(u[part], y[part])
-    if not 0.0 < -np.sign(total) * slope < abs(model.dc_gain):
+    if not 0.0 < -np.sign(total) * slope < gain:
         return None
     probability = 0.5 * (chi_square_tail((slope / deviation) ** 2, 1) if deviation > 0.0 else 0.0)
     if not probability < FEEDBACK_PROBABILITY:

@@ -41,6 +41,7 @@ from estimation.identification.free_run.linear_comparison import (
     Task,
     closed_loop_notes,
     linear_comparison,
+    with_closed_loop_notes,
 )
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import COARSE
@@ -180,7 +181,8 @@ def _identified(
     if structure == "output-error":
         return linear.identified()
     found = _nonlinear_or_linear(structure, linear)
-    return likelier_with_error_model(found, linear) if structure == "auto" else found
+    found = likelier_with_error_model(found, linear) if structure == "auto" else found
+    return with_closed_loop_notes(found, linear)
 
 
 def _identified_from_changes(task: Task) -> tuple[Identified | None, list[Note]]:
@@ -226,7 +228,8 @@ def _clearly_better_nonlinear(
     other = _nonlinear_or_linear(structure, linear)
     left, own = (100.0 - one.held_back_percent for one in (other, found))
     own *= 1.0 if std is None else std / linear.task.by.y_std
-    return other if other.model.structure != "output-error" and left < (1.0 - CLEAR_MARGIN) * own else found
+    better = other.model.structure != "output-error" and left < (1.0 - CLEAR_MARGIN) * own
+    return with_closed_loop_notes(other, linear) if better else found
 
 
 def _nonlinear_or_linear(structure: str, linear: LinearComparison) -> Identified:

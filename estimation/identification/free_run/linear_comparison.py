@@ -22,7 +22,7 @@ from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.transfer_function import gain_deviations, linear_model
 from estimation.identification.free_run.unrelated import linear_explains
-from estimation.identification.notes import IdentificationCode
+from estimation.identification.notes import CLOSED_LOOP, IdentificationCode
 from estimation.log_checks.bridging import bridged
 from plant.notes import Note
 
@@ -137,6 +137,24 @@ class LinearComparison:
             sound = False
         held = 100.0 * (1.0 - best.held_back)
         return Identified(model, quality, held, tuple(self.rows), tuple(notes), sound, gain_std=spread)
+
+
+def with_closed_loop_notes(found: Identified, linear: LinearComparison) -> Identified:
+    """Return a nonlinear model with what the linear one tells of a closed loop; a linear one as it is.
+
+    A nonlinear model may learn the controller's law and its reference in place of the plant, and fit nearly perfectly.
+
+    Parameters
+    ----------
+    found : Identified
+        A model of the same data.
+    linear : LinearComparison
+        Linear models.
+    """
+    if found.model.structure == "output-error" or len(linear.task.data.inputs) > 1:
+        return found
+    told = [note for note in linear.identified().notes if note.code in CLOSED_LOOP]
+    return replace(found, notes=(*found.notes, *told))
 
 
 def linear_comparison(task: Task) -> LinearComparison:

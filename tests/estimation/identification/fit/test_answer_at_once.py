@@ -57,6 +57,15 @@ def test_box_jenkins_with_a_delay_holds_in_such_a_loop_and_is_not_accused() -> N
     assert float(np.mean(np.square(off[1]))) < 1.6**2
 
 
+def test_a_nonlinear_model_of_a_closed_loop_says_so_however_well_it_fits() -> None:
+    u, y = at_once_loop(1)
+    with pytest.warns(LogWarning, match="closed loop"):
+        found = identify_channels(channels_from([u], [y], 0.01, ["u"], "y"), structure="auto")
+    assert found.model.structure == "narx"
+    assert found.held_back_percent > 80.0  # it tells the two values of the set-point from each other
+    assert "feedback_at_once" in {str(note.code) for note in found.notes}
+
+
 def test_the_default_model_of_a_record_warns_too() -> None:
     u, y = at_once_loop(2)
     record = Record(1e-3, {"motor_speed_rad_s": u, "velocity_m_s": y})
@@ -110,6 +119,23 @@ def test_an_answer_in_the_direction_of_the_gain_or_larger_than_it_is_the_plants(
     told = at_once_note(*fitted([-0.2, 0.5], [1.0, -0.7], 0.05))
     assert told is not None
     assert told.data["p_value"] < 1e-6
+
+
+def test_an_output_that_integrates_has_the_sign_of_its_numerator() -> None:
+    rng = np.random.default_rng(8)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 5)
+    y = filtered(np.array([-0.2, 0.5]), np.array([1.0, -1.0]), u) + 0.05 * rng.standard_normal(u.size)
+    model = LinearModel(
+        numerator=np.array([-0.2, 0.5]),
+        denominator=np.array([1.0, -1.0]),
+        delay=0,
+        sample_time=0.01,
+        input_name="u",
+        output_name="y",
+        structure="output-error",
+        covariance=1e-6 * np.eye(3),
+    )
+    assert at_once_note(model, u, y) is not None
 
 
 def test_a_log_too_short_gets_no_note() -> None:

@@ -116,6 +116,7 @@ def test_auto_prefers_a_nonlinear_model_of_levels_only_if_its_error_is_clearly_s
     share = (left or 0.1) * (100.0 - walk.held_back_percent)
     other = replace(walk, model=replace(walk.model, structure=structure), held_back_percent=100.0 - share)
     monkeypatch.setattr(identify, "_nonlinear_or_linear", lambda *_: other)
+    monkeypatch.setattr(identify, "with_closed_loop_notes", lambda one, _: one)
     found = identify._clearly_better_nonlinear(walk, cast(Any, None), "output-error" if left is None else "auto")
     assert found is {"other": other, "walk": walk}[taken]
 
