@@ -8,13 +8,16 @@ circuit's pressure, at which make-up begins.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 from estimation.models.flow import Delivery, chamber_rates, delivered_flow
 from estimation.models.greybox import GreyBoxModel
-from plant.compiled.functions import Scalar, absolute, maximum
+from plant.compiled.functions import Scalar, absolute, maximum, minimum, where
+from plant.components.friction import velocity_under_friction
 from plant.components.oil import ATMOSPHERE
+from plant.eha.circuit_start import push_at_rest
 from plant.eha.model import EhaParameters, load_on_rod, piston_areas
 from plant.units import si
 
@@ -111,9 +114,28 @@ def parallel_friction(velocity: Scalar, bristle: Scalar, p: SimpleNamespace) -> 
     return rate, p.friction_coulomb * bristle + damping * rate + beside
 
 
-def _at_rest(p: SimpleNamespace) -> tuple[Scalar, ...]:
-    held, supply = p.load_force / p.piston_area, p.accumulator_pressure
-    return 0.0, 0.0, 0.0, supply + maximum(held, 0.0), supply + maximum(-held, 0.0)
+def _at_rest(friction: Friction, p: SimpleNamespace) -> tuple[Scalar, ...]:
+    """Return the state with the motor at rest; a single rod creeps if friction does not hold it.
+
+    The low side is at the inner circuit's pressure, and the high side above it: the piston sweeps what leaks there, and
+    the force that is left is friction. So the pressure is the root of the quadratic that an implicit step solves.
+    """
+    single, supply = absolute(p.area_difference) > 0.0, p.accumulator_pressure
+    area_a, area_b = piston_areas(p)
+    push = push_at_rest(p)
+    high = where(push > 0.0, area_b, area_a)
+    creep = (p.leakage_coefficient + p.case_leakage) / high
+    above = velocity_under_friction(
+        push, high + p.friction_linear * creep, p.friction_quadratic * creep * creep, p.friction_coulomb
+    )
+    velocity = creep * above
+    free, bent = (friction(velocity, bristle, p)[0] for bristle in (0.0, 1.0))
+    slides = absolute(free - bent) > 0.0
+    standing = maximum(minimum(push / p.friction_coulomb, 1.0), -1.0)
+    bristle = where(slides, free / where(slides, free - bent, 1.0), standing)
+    held = where(single, -above, p.load_force / p.piston_area)
+    moving = where(single, velocity, 0.0), where(single, bristle, 0.0)
+    return 0.0, *moving, supply + maximum(held, 0.0), supply + maximum(-held, 0.0)
 
 
 def _observed_position(state: Any) -> tuple[Scalar]:
@@ -137,7 +159,7 @@ def _motion_form(name: str, friction: Friction) -> GreyBoxModel:
         drives=("motor_speed_rad_s", "position_m"),
         outputs=("position_m",),
         unknowns=(),
-        initial=_at_rest,
+        initial=partial(_at_rest, friction),
         rates=rates,
         observe=_observed_position,
         parameters=MotionParameters,

@@ -15,7 +15,7 @@ from faults.diagnosis.circuits.blocks import Blocks
 from plant.arrays import Array
 from plant.components.friction import quadratic_friction
 from plant.eha.circuit_parameters import CircuitParameters, circuit_values, longest_stroke
-from plant.eha.circuit_start import at_rest, under_pressure
+from plant.eha.circuit_start import at_rest, pressure_of_force, under_pressure
 from plant.eha.model import EhaParameters
 from plant.eha.one_sided import circuit_groups, circuit_plant, padded_row
 from plant.eha.simulate import CIRCUIT
@@ -271,7 +271,7 @@ def _initial_states(blocks: Blocks, rows: Array) -> Array:
     begun = blocks.raw_start_values if blocks.start_values is None and np.any(p.load_force) else blocks.start_values
     if blocks.start_velocity:
         velocity, law = blocks.start_velocity, (p.friction_quadratic, p.friction_linear, p.friction_coulomb)
-        begun = (quadratic_friction(velocity, np.sign(velocity), *law) + p.load_force) / p.piston_area, velocity
+        begun = pressure_of_force(quadratic_friction(velocity, np.sign(velocity), *law), p), velocity
     states = at_rest(p) if begun is None else under_pressure(*begun, p)
     found = np.empty((len(rows), len(states)))
     for place, state in enumerate(states):
