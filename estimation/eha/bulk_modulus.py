@@ -19,6 +19,7 @@ from estimation.finding import Gate, Outcome
 from estimation.fits.flow.fit import REPORTED, fit_flow
 from estimation.fits.flow.log import FLOW_CHANNELS, require_flow_channels
 from estimation.fits.flow.log_traits import LogTraits
+from estimation.fits.flow.swapped_sides import SidesCode
 from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.hypothesis_search.pump_delivery import delivery_share
 from estimation.fits.motion.fit import MOTION_CHANNELS, fit_motion
@@ -221,7 +222,7 @@ def _fit(
     loaded = not chosen and first_load(record, log.variances) != 0.0
     traits = LogTraits(loaded, begins_in_motion(record), log.filtered, log.speed_held, log.averaged)
     fit = fit_flow(record, parameters, guess, doubted, log.variances, traits)
-    ended = any(note.code == EstimateCode.SEARCH_ENDED for note in fit.reasons)
+    ended = any(note.code in (EstimateCode.SEARCH_ENDED, SidesCode.SIDES_SWAPPED) for note in fit.reasons)
     plain = not fit.reasons  # explained down to the noise: a load that leaks off at once leaves no trace
     # None leaves the log to a filter, which need not begin at rest
     return None if loaded and fit.explanation is None and not (ended or plain) else fit

@@ -29,6 +29,7 @@ from estimation.fits.flow.other_minimum import lower_minimum
 from estimation.fits.flow.plain import FitStart, Logged, PlainFits, plain_fits, quieter_start, with_stiff_oil
 from estimation.fits.flow.search import MAKEUP_TRIED
 from estimation.fits.flow.shut_valves import shut_valves
+from estimation.fits.flow.swapped_sides import swapped_sides
 from estimation.fits.flow.told_volume import explained_bound, ratio_doubt, unlikely_volume_doubt
 from estimation.fits.greybox.lateness import omitted_delay_doubt
 from estimation.fits.greybox.play import NO_PLAY, ShownPlay, omitted_play_note, play_structure, sensed_play
@@ -163,7 +164,10 @@ def fit_flow(
     else:
         fit = _plain_fit(plain, sensed, (*open_ends, *shut_valves(plain, traits)), begun=BEGUN_UNDER_LOAD in asked)
     late = corrected.logged.mean.late_rows * record.sample_time
-    fit = replace(fit, mean_late=late, parameters=with_structure(fit.parameters, unplaced))
+    begun = (BEGUN_UNDER_LOAD,) if traits.loaded or traits.moving else ()
+    swapped = swapped_sides(plain, strange, corrected.logged, begun, lambda one, these: _ask(one, these, traits)[0])
+    told = with_structure(fit.parameters, unplaced)
+    fit = replace(fit, mean_late=late, parameters=told, reasons=(*swapped, *fit.reasons))
     return replace(fit, reasons=(*fit.reasons, EstimateCode.SEARCH_ENDED.note())) if ended else fit
 
 
