@@ -14,7 +14,7 @@ from typing_extensions import TypeVar
 
 from plant.atomic import replacing
 from plant.eha.doubts import Spread, default_uncertainties, spreads_of
-from plant.eha.model import PAIRS, SIZED_BY_PUMP, EhaParameters
+from plant.eha.model import PAIRS, SIZED_BY_PUMP, VOLUME_SHARE, EhaParameters
 from plant.errors import RigError
 from plant.log.columns import check_columns
 from plant.small_file import small_toml
@@ -215,7 +215,7 @@ def _pairs_of(parameter_class: type[Any]) -> Mapping[str, str]:
 
 
 def _without_pairs(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[str, Any]:
-    """Return a file's values; pairs for sides A and B become their mean and relative difference."""
+    """Return a file's values; pairs for sides A and B become mean and relative difference, volumes go with areas."""
     values = dict(given)
     for name, difference in pairs.items():
         pair = given.get(name)
@@ -230,7 +230,7 @@ def _without_pairs(given: Mapping[str, Any], pairs: Mapping[str, str]) -> dict[s
         side_a, side_b = pair
         values |= {name: 0.5 * (side_a + side_b), difference: (side_a - side_b) / (side_a + side_b)}
         if name == "piston_area" and side_a != side_b:
-            values.setdefault("pilot_share", 1.0)
+            values = {"pilot_share": 1.0, "volume_difference": VOLUME_SHARE * values[difference], **values}
     return values
 
 

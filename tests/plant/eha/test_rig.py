@@ -195,6 +195,18 @@ def test_two_areas_and_volumes_are_a_mean_and_a_difference_with_piloted_valves(t
     assert rig_of(tmp_path, text + "pilot_share = 0.0\n").parameters.pilot_share == 0.0
 
 
+def test_one_volume_beside_two_areas_is_a_mean_and_the_sides_differ_less_than_the_areas(tmp_path: Path) -> None:
+    text = "[parameters]\npiston_area = [15.2e-4, 10.64e-4]\n"
+    for more in ("", "chamber_volume = 9e-4\n"):
+        p = rig_of(tmp_path, text + more).parameters
+        assert p.volume_difference == 0.75 * p.area_difference > 0.0
+    assert p.chamber_volume == 9e-4
+    assert rig_of(tmp_path, text + "volume_difference = 0.0\n").parameters.volume_difference == 0.0
+    assert rig_of(tmp_path, text + "chamber_volume = [9e-4, 8e-4]\n").parameters.volume_difference == pytest.approx(
+        1.0 / 17.0
+    )
+
+
 def test_a_template_takes_two_areas_and_volumes_in_place_of_one(tmp_path: Path) -> None:
     text = rig_template().replace("\npiston_area = 0.00152", "\npiston_area = [15.2e-4, 10.64e-4]")
     text = text.replace("\nchamber_volume = 0.00108", "\nchamber_volume = [1.08e-3, 0.756e-3]")
