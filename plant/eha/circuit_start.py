@@ -176,7 +176,8 @@ def _make_up_drop(wanted: Scalar, drained: Scalar, p: CircuitValues) -> Scalar:
         2.0 * maximum(wanted, 0.0) * p.makeup_opening / where(seat > 0.0, seat + root, 1.0),
         0.5 * (root - seat) / where(wide > 0.0, wide, 1.0),
     )
-    returned = minimum(wanted, 0.0) / maximum(pilot + drained, _TIGHTEST * p.makeup_conductance)
+    out = maximum(pilot + drained, _TIGHTEST * (p.makeup_conductance + p.leakage_coefficient))
+    returned = minimum(wanted, 0.0) / where(out > 0.0, out, 1.0)
     most = _MOST_DROP * (p.accumulator_pressure - p.vapour_pressure)
     return maximum(minimum(where(wanted > 0.0, opened, returned), most), -p.relief_pressure)
 
@@ -185,8 +186,8 @@ _MOST_DROP = 0.9
 """Largest drop at which a creep is sought, over that to vapour [fraction]: valves that are shut pass nothing."""
 
 _TIGHTEST = 1e-9
-"""Least conductance out of the low side, over that of its open make-up valve [dimensionless]: without pilot and drain
-it is pumped up until it holds the piston."""
+"""Least conductance out of the low side, over that of make-up valve and leakage [dimensionless]: without pilot and
+drain it is pumped up until it holds the piston."""
 
 
 def _state(bristle: Scalar, velocity: Scalar, above: tuple[Scalar, Scalar], p: CircuitValues) -> CircuitState:

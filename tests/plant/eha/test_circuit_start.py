@@ -147,3 +147,18 @@ def test_a_pressure_acts_on_the_side_that_it_is_in(sense: float) -> None:
     force = sense * 2e5 * area + 2.0 * 0.2 * p.piston_area * (p.accumulator_pressure - ATMOSPHERE) - 200.0
     assert under_pressure(sense * 2e5, 0.0, p)[1] == pytest.approx(force / 1e4, rel=1e-12)
     assert pressure_of_force(force, p) == pytest.approx(sense * 2e5, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize(("leakage", "pilot"), [(0.0, 0.0), (1e-10, 0.0), (1e-10, 1.0)])
+def test_a_rod_without_make_up_valves_or_drain_has_a_finite_start(load: float, leakage: float, pilot: float) -> None:
+    p = replace(
+        SINGLE,
+        load_force=load,
+        makeup_conductance=0.0,
+        pump_case_leakage=0.0,
+        leakage_coefficient=leakage,
+        pump_crossport_leakage=0.0,
+        pilot_share=pilot,
+    )
+    assert np.all(np.isfinite(at_rest(p)))
