@@ -20,9 +20,8 @@ def circuit(
 ) -> None:
     """Repeat the paper's experiments (Figures 3 to 11, section 4) on the circuit plant; write tables, figures, report.
 
-    The circuit plant has two chambers, make-up valves, relief valve, throttles, presliding friction and motor lag,
-    which no filter here models. Takes one to six minutes, a quick one half a minute. The last line of standard output
-    is the report's path.
+    The circuit plant has two chambers, make-up valves, relief valve, throttles, presliding friction and motor lag.
+    Takes one to six minutes, a quick one half a minute. The last line of standard output is the report's path.
     """
     from experiments.circuit.study import CIRCUIT
     from experiments.nine_conditions.settings import StudySettings, quick_settings

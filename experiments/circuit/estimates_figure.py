@@ -33,7 +33,7 @@ def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
         One panel for each form, one row for each condition, one dot for each first guess.
     """
     estimates = tables["figure 11 bulk modulus"]
-    title = "Estimates of bulk modulus on the circuit plant, which no form here assumes"
+    title = "Estimates of bulk modulus on the circuit plant"
     forms = list(dict.fromkeys(estimates["form"]))
     figure, axes = panels(title, 1, len(forms), 4.0, _BESIDE_TITLED, sharey=True)
     for axis, form in zip(axes, forms, strict=True):
@@ -47,7 +47,8 @@ def draw_bulk_modulus(tables: Mapping[str, pd.DataFrame]) -> Figure:
         axis.axvline(truth, color=BLACK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
         ends = rows[["value_pa", "ci95_low_pa", "ci95_high_pa", "truth_pa"]] / MEGA
         low, high = max(0.0, float(ends.min().min())), min(2.0 * truth, float(ends.max().max()))
-        axis.set(xlim=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
+        if high > low:  # else there is nothing but the line of the true value
+            axis.set(xlim=(low - 0.05 * (high - low), high + 0.05 * (high - low)))
         axis.locator_params(axis="x", nbins=5)
     return figure
 

@@ -133,7 +133,7 @@ def _draw_law(axis: Axes, refit: pd.DataFrame, across: np.ndarray, law: Callable
 def _draw_validation_input(tables: Tables) -> Figure:
     """Draw the nine steps of section 6, as Figure 10 does."""
     steps = tables["figure 10 validation input"]
-    title = "The validation input: nine steps of 2.5 V to 4 V that turn round"
+    title = "The validation input: nine steps of 2.5 V to 4 V in alternating direction"
     figure, (axis,) = panels(title, 1, 1, 2.8, Margins(left=0.7))
     axis.step(steps["time_s"], steps["motor_voltage_v"], where="post", color=BLUE)
     for level in (-4.0, -2.5, 2.5, 4.0):

@@ -27,12 +27,14 @@ from experiments.circuit.steady_experiments import (
     throttle_curve,
 )
 from experiments.nine_conditions.settings import StudySettings
+from experiments.page.numbers import pretty_unit
 from experiments.page.tables import Column, Columns, interval, name_in_words
 from experiments.page.words import CONDITION
 from experiments.running.progress import Track
 from experiments.running.random_streams import stream
 from experiments.running.study import Study, StudyResult
 from plant.eha.circuit_parameters import CircuitParameters
+from plant.units import notes
 
 
 def circuit_studies(
@@ -75,13 +77,20 @@ def _find(settings: StudySettings, track: Track) -> StudyResult:
 
 RIG = CircuitParameters()
 
+
+def _coefficient(name: str) -> str:
+    """Return a coefficient as the rig file calls it, with its unit."""
+    note = notes(CircuitParameters)[name]
+    return f"{note.meaning} [{pretty_unit(note.unit)}]"
+
+
 _PERCENT_COLUMNS = (
     Column("percent_of_normal", "circuit", "% of normal", digits=3),
     Column("published_percent", "published", "% of normal", digits=3),
 )
 _REFIT_COLUMNS = (
     "level",
-    Column("coefficient", words=name_in_words),
+    Column("coefficient", of_row=lambda row: _coefficient(str(row["coefficient"]))),
     "published",
     Column("went_in", "simulated with"),
     "refitted",

@@ -69,4 +69,4 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
         bandwidths = (f"{row['bandwidth_hz']:.3g}", told)
         shown.add_row(row["condition"], order, gain, printed, *bandwidths, f"{row['fit_percent']:.1f}")
     yield shown
-    yield "Gains ± one standard deviation; Table 6's as its four digits leave them open, at the inferred 1 ms."
+    yield "Gains ± one standard deviation; those of Table 6 are what its four digits allow, at the inferred 1 ms."

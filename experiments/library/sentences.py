@@ -38,10 +38,10 @@ def structure_sentences(found: pd.DataFrame) -> tuple[str, str, str]:
         "Why: output error minimises the error of the free run. The others minimise the error one step ahead, which "
         "weighs each frequency by the input's power over that of the noise model. Friction leaves a slow residual, "
         f"which the noise model takes up, so the weight moves to high frequencies. Above {PAPER_BANDWIDTH:g} Hz, "
-        f"output error has {weight['output-error']:.0f} % of its weight on average, as the drive has of its "
-        f"power; {rivals}. "
-        "Weights hardly matter for a nearly linear plant, and much under friction. ARX assumes that noise passes "
-        "through the plant's poles, but sensor noise does not: the fitted gain falls to as little as "
+        f"output error has {weight['output-error']:.0f} % of its weight on average, the share that the drive has of "
+        f"its power there; {rivals}. "
+        "The weights hardly matter for a nearly linear plant, but they matter much under friction. ARX assumes that "
+        "noise passes through the plant's poles, but sensor noise does not: the fitted gain falls to as little as "
         f"{gain:.0f} % of output error's.",
     )
 
@@ -89,8 +89,8 @@ def clock_sentences(found: pd.DataFrame) -> tuple[str]:
         f"The paper's 5 Hz clock, read literally, holds each level for 200 ms. At 25 Hz, the gain is then "
         f"{at['200 ms'] / at['10 ms']:.1f} times as uncertain as with 10 ms, and {at['200 ms'] / at['20 ms']:.1f} "
         f"times as uncertain as with 20 ms; the steady gain is {steady['10 ms'] / steady['200 ms']:.1f} times less "
-        "uncertain than with 10 ms. A maximum-length sequence made for 25 Hz is there within "
-        f"{100.0 * (at[MADE_FOR] / at.min() - 1.0):.0f} % of the best test.",
+        "uncertain than with 10 ms. With a maximum-length sequence made for 25 Hz, the deviation at 25 Hz is "
+        f"{100.0 * (at[MADE_FOR] / at.min() - 1.0):.0f} % above that of the best test.",
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from estimation.finding import NORMAL_95
 from estimation.identification.design.input_design import Limits
 from experiments.library.figures import LIBRARY_FIGURES
-from experiments.library.library import build_library, library_text
+from experiments.library.library import MEAN_V, build_library, library_text
 from experiments.library.sentences import clock_sentences, order_sentences, structure_sentences
 from experiments.library.structures import clock_table, order_and_bandwidth, structure_table
 from experiments.library.tables import library_table, response_table, root_table
@@ -47,6 +47,7 @@ def _facts(tables: Tables, _: SeedSettings) -> Mapping[str, Any]:
     return {
         "best": int(ours["best"].sum()),
         "conditions": len(ours),
+        "mean_v": f"{MEAN_V:g}",
         "structure_sentences": structure_sentences(tables["structures"]),
         "order_sentences": order_sentences(tables["orders"]),
         "clock_sentences": clock_sentences(tables["clocks"]),
@@ -124,7 +125,7 @@ COLUMNS: Mapping[str, Columns] = {
         *(Column(f"value_{k}_over_floor", f"value {k}", "over floor", digits=2) for k in (1, 2, 3)),
         *(Column(f"fit_{order}_percent", f"fit, order {order}") for order in (1, 2, 3, 4)),
         Column("bandwidth_hz", "3 dB down", digits=3),
-        Column("bandwidth_std_hz", "± one deviation", digits=1),
+        Column("bandwidth_std_hz", "± one standard deviation", digits=1),
     ),
     "clocks": (
         *(Column("input", "test"), _at_frequency),

@@ -160,11 +160,11 @@ def _published_filter(estimates: pd.DataFrame) -> Mapping[str, OurResult]:
     spread = 100.0 * (settled.max() - settled.min()) / settled.mean()
     pressure = recoveries(estimates)[PRESSURE_STEPS]
     starts = own["start_pa"].astype(float)
-    low, high = sticks["filter_settled_at_pa"].min(), sticks["filter_settled_at_pa"].max()
+    low, high = (1e-6 * float(getattr(sticks["filter_settled_at_pa"], end)()) for end in ("min", "max"))
     return {
         "ekf_spread": OurResult(float(spread.max())),
         "ekf_sticks": OurResult(
-            float(sticks["filter_settled_at_pa"].mean()), said=f"{low:.3g} to {high:.3g} Pa; {_gate(sticks)}"
+            float(sticks["filter_settled_at_pa"].mean()), said=f"{low:.3g} to {high:.3g} MPa; {_gate(sticks)}"
         ),
         "start_low": OurResult(float(starts.min())),
         "start_high": OurResult(float(starts.max())),
@@ -186,7 +186,7 @@ def _modelled_chambers(estimates: pd.DataFrame) -> Mapping[str, OurResult]:
     z = float(np.sqrt(np.mean(estimates["z"] ** 2)))
     # NaN if the gate withholds any estimate
     worst = float(estimates["error_percent"].abs().max(skipna=False))
-    return {"chambers_worst": OurResult(worst, said=f"{_gate(estimates)}, errors {z:.2f} of their deviations rms")}
+    return {"chambers_worst": OurResult(worst, said=f"{_gate(estimates)}, errors of {z:.2f} standard deviations rms")}
 
 
 def settled_by_condition(estimates: pd.DataFrame) -> Mapping[str, OurResult]:
@@ -225,7 +225,7 @@ def _settled_result(rows: pd.DataFrame) -> OurResult:
     value = float(rows["filter_settled_at_pa"].mean())
     spread = NORMAL_95 * float(rows["filter_std_pa"].mean())
     covered = (rows["filter_settled_at_pa"] - RIG.bulk_modulus).abs() <= NORMAL_95 * rows["filter_std_pa"]
-    said = f"{_gate(rows)}; 95 % interval ± {1e-6 * spread:.2g} MPa holds 207 MPa in {covered.sum()} of {len(rows)}"
+    said = f"{_gate(rows)}; 95 % interval ± {1e-6 * spread:.2g} MPa contains 207 MPa in {covered.sum()} of {len(rows)}"
     return OurResult(value, said=said)
 
 

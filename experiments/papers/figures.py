@@ -72,7 +72,9 @@ def _draw_bent_plate(tables: Tables) -> Figure:
 def _draw_mode_shapes(tables: Tables) -> Figure:
     """Draw the shapes of the dry plate's first six modes: Figure 43."""
     margins = Margins(left=0.3, top=0.75, across=0.4, down=0.5, bottom=0.2)
-    figure, axes = panels("Shapes of the dry plate's first six modes: blue rises while red falls", 2, 3, 5.4, margins)
+    figure, axes = panels(
+        "Shapes of the dry plate's first six modes: blue rises while orange falls", 2, 3, 5.4, margins
+    )
     for axis, (number, rows) in zip(axes, tables["mode shapes"].groupby("mode"), strict=True):
         radius, angle = rows["share_of_radius"], rows["angle_rad"]
         across, up = radius * np.cos(angle), radius * np.sin(angle)

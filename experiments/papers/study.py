@@ -101,7 +101,7 @@ def _our_cell(row: Row) -> Cell:
         decimals, exponent = len(powers[1]) + 1, int(powers[2])
         return right_aligned(_with_powers_of_ten(f"{value / float(f'1e{exponent}'):.{decimals}f}e{exponent}"))
     # one digit more than printed, so that both can be compared
-    digits = max(5, 1 + len(re.sub(r"e.*|\D", "", str(row["printed"])).lstrip("0")))
+    digits = max(5, 1 + len(re.sub(rf"(e|{TIMES.strip()}).*|\D", "", str(row["printed"])).lstrip("0")))
     return right_aligned(exact(float(f"{value:.{min(digits, 10)}g}")))
 
 
@@ -141,12 +141,12 @@ COLUMNS: Mapping[str, Columns] = {
         "paper",
         *(verdict.value for verdict in Verdict),
         "rows",
-        Column("empty", "of these we have nothing to compare"),
+        Column("empty", "rows without a value of ours"),
     ),
     "figures": (
         *("paper", "figure", "title"),
         Column("drawn", words=_verdict),
-        Column("missed", "rows that did not come back"),
+        Column("missed", "rows that do not agree"),
         Column("rows", "rows about it"),
         Column("difference", "difference or reason"),
         Column("shown_by", "command: drawing"),

@@ -1,6 +1,7 @@
 """The circuit's figures show the content of its tables, and its page is a single file."""
 
 import re
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,6 +14,7 @@ from experiments.circuit.study import CIRCUIT, circuit_studies
 from experiments.page.figure_files import figure_files
 from experiments.page.render import render_page
 from experiments.page.style import project_style
+from experiments.page.tables import html_table
 from experiments.running.study import SeedSettings
 from plant.eha.circuit_parameters import CircuitParameters
 
@@ -125,3 +127,27 @@ def test_the_page_contains_every_figure_and_loads_nothing(
     for number in re.findall(r'href="#(E\d+)"', page):
         assert f'id="{number}"' in page
     assert all(image[:4] == b"\x89PNG" for path, image in figures.items() if path.endswith(".png"))
+
+
+def test_a_panel_in_which_nothing_is_observable_is_drawn_without_a_warning(tables: Mapping[str, pd.DataFrame]) -> None:
+    """Before, the command showed a warning of Matplotlib, since such a panel ranges from the true value to itself."""
+    estimates = _estimates()
+    hidden = estimates["form"] == "acceleration"
+    estimates.loc[hidden, ["value_pa", "ci95_low_pa", "ci95_high_pa"]] = np.nan
+    with project_style(), warnings.catch_warnings(action="error"):
+        figure = CIRCUIT_FIGURES["figure_11"]({**tables, "figure 11 bulk modulus": estimates})
+    low, high = figure.axes[2].get_xlim()
+    assert low < 207.0 < high
+
+
+def test_each_coefficient_of_the_page_has_its_unit(tables: Mapping[str, pd.DataFrame]) -> None:
+    """Before, the page said that the coefficients are in SI units, and not in which."""
+    page = str(
+        html_table(tables["figure 9 friction refitted"], CIRCUIT.columns["figure 9 friction refitted"], "Table.")
+    )
+    assert "quadratic friction a_1 [N s²/m²]" in page
+    assert "Coulomb friction a_3 [N]" in page
+    page = str(
+        html_table(tables["figure 8 leakage flow refitted"], CIRCUIT.columns["figure 8 leakage flow refitted"], "")
+    )
+    assert "lumped leakage L_t [m³/(s Pa)]" in page

@@ -99,6 +99,9 @@ def test_the_page_contains_every_figure_and_loads_nothing(tables: Mapping[str, p
     for target in re.findall(r'href="#([^"]+)"', page):
         assert f'id="{target}"' in page
     assert all(image[:4] == b"\x89PNG" for path, image in figures.items() if path.endswith(".png"))
+    # the page shows two models for each condition, with other gains, and has to say from which test each is
+    assert "around 4 V, at which the piston does not reverse" in " ".join(page.split())
+    assert "by condition, around a mean of 4 V." in " ".join(page.split())
 
 
 @pytest.mark.slow

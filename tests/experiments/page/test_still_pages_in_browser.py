@@ -56,6 +56,18 @@ def test_the_name_of_a_log_above_a_value_breaks_on_a_phone(browser: Any) -> None
     page.close()
 
 
+@pytest.mark.parametrize("width", [390, 768])
+def test_a_printed_value_has_its_name_beside_ours_on_a_phone_and_a_tablet(browser: Any, width: int) -> None:
+    """Before, the page of the papers had a number without a name above the one called "ours"."""
+    style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
+    cells = "".join(f'<td data-head="{name}">1</td>' for name in ("claim", "printed", "ours", "unit", "note"))
+    page = browser.new_page(viewport={"width": width, "height": 800})
+    page.set_content(f'<style>{style}</style><table class="cards whole"><tbody><tr>{cells}</tr></tbody></table>')
+    named = "one => getComputedStyle(one, '::before').display"
+    assert [page.locator("td").nth(place).evaluate(named) for place in range(3)] == ["none", "block", "block"]
+    page.close()
+
+
 def test_a_wide_table_on_a_phone_has_a_gradient_and_a_fixed_first_column(browser: Any, pages: dict[str, Path]) -> None:
     page = browser.new_page(viewport={"width": 390, "height": 800})
     page.goto(pages["study"].as_uri())

@@ -134,6 +134,7 @@ def test_an_interval_that_excludes_the_printed_value_is_detected() -> None:
         ("5.57e-7", 5.57e-7, f"5.570{TIMES}10⁻⁷"),
         ("-7.440e3", -7451.0, f"{MINUS}7.4510{TIMES}10³"),
         ("58", 62.11, "62.11"),
+        (f"2.07{TIMES}10⁸", 5.426518e6, f"5.4265{TIMES}10⁶"),  # the 10 of the power is no printed digit
     ],
 )
 def test_our_value_is_shown_with_the_power_of_ten_of_the_printed_one(printed: str, value: float, shown: str) -> None:
