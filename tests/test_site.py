@@ -6,6 +6,7 @@ import subprocess
 import sys
 from functools import cache
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -99,10 +100,37 @@ def test_the_drawing_shows_every_subpackage_and_imports_point_only_left() -> Non
     assert all(site_pages.LAYERS.index(used) <= site_pages.LAYERS.index(user) for user, used in layers)
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def built_site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the built site, of which a warning is an error."""
     pytest.importorskip("sphinx")
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(tmp_path)]
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603  our own pages
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "generated" / "api_plant.html").is_file()
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(built_site: Path) -> None:
+    assert (built_site / "generated" / "api_plant.html").is_file()
+
+
+@pytest.mark.slow
+def test_the_site_prints_code_whole_ranks_decisions_last_and_has_no_error(built_site: Path, browser: Any) -> None:
+    """Before, a line of code was cut at the edge of a sheet, and decisions came before the tutorials in the search."""
+    page = browser.new_page(viewport={"width": 720, "height": 900})
+    complaints: list[str] = []
+    page.on("console", lambda said: said.type == "error" and complaints.append(said.text))
+    page.goto((built_site / "tutorials" / "leaking.html").as_uri())
+    page.emulate_media(media="print")
+    assert page.locator("pre").evaluate_all("all => all.every(one => one.scrollWidth <= one.clientWidth)")
+    page.emulate_media(media="screen")
+    page.goto((built_site / "search.html").as_uri() + "?q=leakage_flow")
+    page.locator("#search-results li >> nth=3").wait_for()
+    found = page.locator("#search-results li > a").evaluate_all("all => all.map(one => one.getAttribute('href'))")
+    decisions = [one.startswith("decisions") for one in found]
+    assert decisions == sorted(decisions)
+    assert not decisions[0]
+    assert complaints == []
+    page.close()

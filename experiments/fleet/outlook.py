@@ -93,7 +93,7 @@ class Outlook:
         if not count:
             return ""
         if not first:
-            return "past the limit in every log"
+            return "past the limit in every log" if count > 1 else "past the limit in the only log"
         day = self.logs[first].named.day
         return f"past the limit since {day}" if day else f"past the limit for {count} log{'s' if count > 1 else ''}"
 

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.fleet.actuators import ActuatorRow
+from experiments.fleet.outlook import outlook_of
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.condition_names import condition_in_words, level_in_words
 from experiments.page.names_shown import QUANTITY_NAMES
@@ -217,10 +218,11 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     """
     last = row.last
     told = last.has_verdict  # if no model fits, the severities are not the actuator's
-    share = round(100.0 * last.worst.share, 1) if last.worst is not None and told else None
+    share = round(100.0 * last.worst.share, 1) + 0.0 if last.worst is not None and told else None  # no minus nought
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
-    words = "" if outlook is None else outlook.words.replace("past the limit ", "past ", 1)
+    words = _outlook_of_few(row) if outlook is None else outlook.words
+    words = words.replace("past the limit ", "past ", 1)
     if outlook is not None and last.worst is not None and outlook.name != last.worst.name:
         words = f"{QUANTITY_NAMES.get(outlook.name, outlook.name)}: {words}"
     return [
@@ -234,6 +236,12 @@ def row_cells(row: ActuatorRow) -> list[Any]:
         last.named.day,
         len(row.logs),
     ]
+
+
+def _outlook_of_few(row: ActuatorRow) -> str:
+    """Return since when an actuator of too few logs for a trend is past its limit; else that they are too few."""
+    few = None if row.last.worst is None else outlook_of(row.logs, row.last.worst.name)
+    return "" if few is None else few.past or "too few logs"
 
 
 def no_verdict_since(row: ActuatorRow) -> str:

@@ -1,10 +1,8 @@
-"""One small study per session, for tests of figures, report and store; and a browser, if one is installed."""
+"""One small study per session, for tests of figures, report and store."""
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
@@ -102,19 +100,3 @@ def motor_tables() -> Tables:
 @pytest.fixture(scope="session")
 def motor_paper_tables() -> Tables:
     return MOTOR_PAPER.find(SeedSettings(2024), without_progress).frames
-
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    if CHROMIUM is None:
-        pytest.skip("needs Chromium (Debian's package chromium)")
-    with playwright.sync_playwright() as started:
-        one = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield one
-        one.close()

@@ -17,7 +17,7 @@
 
   function cell(column, value, link) {
     if (column.kind === "number") {
-      const words = value === null ? "–" : `${numberText.format(value)}${column.unit ? ` ${column.unit}` : ""}`;
+      const words = value === null ? "–" : `${numberText.format(value).replace("-", "\u2212")}${column.unit ? ` ${column.unit}` : ""}`;
       return element("td", { class: value === null ? "number unknown" : "number", role: "cell", "data-head": column.label }, words);
     }
     if (column.kind === "state") return element("td", { class: `fleet-${value}`, role: "cell" }, column.words[value]);

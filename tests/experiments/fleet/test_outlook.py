@@ -82,6 +82,31 @@ def test_the_outlook_of_few_logs_gives_since_when_the_limit_is_passed() -> None:
     assert always.words == "past the limit in every log"
 
 
+@pytest.mark.parametrize(
+    ("leakages", "said"),
+    [
+        ([1.2], "too few logs"),
+        ([1.2, 1.3, 1.2], "too few logs"),
+        ([4.0], "past in the only log"),
+        ([4.0, 4.1], "past in every log"),
+        ([1.2, 1.2, 4.0], "past since 2"),
+    ],
+)
+def test_an_actuator_of_one_to_three_logs_says_since_when_it_is_past_its_limit(
+    leakages: list[float], said: str
+) -> None:
+    """Before, its outlook in the table of the fleet was an empty cell."""
+    assert row_cells(actuator(leakages))[5] == said
+
+
+def test_a_severity_as_when_healthy_is_0_percent_of_its_limit_without_a_sign() -> None:
+    """Before, the table of a fleet showed -0 % where a value was a little better than healthy."""
+    kept = json.loads(store_row("P-1_1.csv", 0.9999)["quantities"])
+    sound = store_row("P-1_1.csv", 1.0, quantities=json.dumps({"leakage_flow": kept["leakage_flow"]}))
+    (row,) = actuator_rows(log_rows([sound], by_pattern(["P-1_1.csv"], "{actuator}_{date}.csv"), {}))
+    assert str(row_cells(row)[4]) == "0.0"
+
+
 def test_constant_leakage_raises_no_alarm() -> None:
     row = actuator(np.full(30, 1.5))
     assert row.state == "within"
