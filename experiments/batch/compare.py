@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from experiments.page.numbers import MINUS
 from plant.errors import HydrostateError
 
 SERIES_COLUMNS = ["plant", "file", "drive", "sensors", "condition", "seed", "duration_s", "sample_time_s"]
@@ -152,15 +153,19 @@ def in_sentences(table: pd.DataFrame, names: Sequence[str]) -> list[str]:
     list of str
         One sentence for each verb and measure, over all conditions.
     """
+
+    def signed(value: float) -> str:
+        return "0" if value == 0.0 else f"{value:+.3g}".replace("-", MINUS)
+
     sentences: list[str] = []
     for row in table[table["condition"] == "all"].to_dict("records"):
         change = f" ({row['changed']})" if row["changed"] else ""
         interval = ""
         if row["low"] is not None and not pd.isna(row["low"]):
-            interval = f", 95 % interval {row['low']:+.3g} to {row['high']:+.3g}"
+            interval = f", 95 % interval {signed(row['low'])} to {signed(row['high'])}"
         sentences.append(
             f"{row['verb']}{change}, {row['measure']}: {row['first']:.3g} {row['unit']} in {names[0]}, "
-            f"{row['second']:.3g} {row['unit']} in {names[1]}, difference {row['difference']:+.3g}{interval}: "
+            f"{row['second']:.3g} {row['unit']} in {names[1]}, difference {signed(row['difference'])}{interval}: "
             f"{row['verdict']}"
         )
     return sentences

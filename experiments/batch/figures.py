@@ -30,6 +30,9 @@ from experiments.page.words import condition_in_words
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
 
+MARKS = "os^DvPX"
+"""A marker for each method, because colour alone does not distinguish them; with the colours, 42 differ."""
+
 ROW_INCHES = 0.34
 """Height of a condition's row in a figure [inch]."""
 
@@ -75,11 +78,11 @@ def _draw_errors(table: pd.DataFrame) -> Figure:
     edge = min(FARTHEST_PERCENT, 1.1 * max(0.1, float(shown[["low_percent", "high_percent"]].abs().max().max())))
     axis.axvline(0.0, color=GREY, linewidth=0.8)
     spread = shown[["low_percent", "median_percent", "high_percent"]].astype(float).clip(-edge, edge).to_numpy()
-    for name, offset, colour in zip(names, offsets, cycle(COLOURS), strict=False):
+    for name, offset, colour, mark in zip(names, offsets, cycle(COLOURS), cycle(MARKS), strict=False):
         mine = np.array(ways) == name
         low, middle, high = spread[mine].T
         axis.hlines(levels[mine] + offset, low, high, color=colour)
-        axis.plot(middle, levels[mine] + offset, "o", markersize=4, color=colour, label=name)
+        axis.plot(middle, levels[mine] + offset, mark, markersize=4, color=colour, label=name)
     beyond = ", errors beyond stand at the edge" if edge == FARTHEST_PERCENT else ""
     axis.set(xlim=(-1.05 * edge, 1.05 * edge), xlabel=f"error of bulk modulus [%]{beyond}")
     axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.45 / (height - margins.top - margins.bottom)), fontsize=8.5)

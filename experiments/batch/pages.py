@@ -262,6 +262,18 @@ def below_one_folder(files: Sequence[Any]) -> list[Any]:
     return [file.removeprefix(shared) if isinstance(file, str) else file for file in files]
 
 
+def _compared(name: str, header: str | None = None) -> Column:
+    """Return a column of a comparison, with the decimals that the interval of the row's difference has."""
+
+    def cell(row: Row) -> Cell:
+        ends = [row["low"], row["high"]]
+        if any(end is None or end != end for end in ends):
+            ends = sorted((row["first"], row["second"]))
+        return right_aligned(fixed(row[name], decimals_of(*ends, most=6)))
+
+    return Column(name, header or name, "%", of_row=cell)
+
+
 def render_comparison(table: pd.DataFrame, names: Sequence[str]) -> str:
     """Return the comparison of two studies as one HTML page.
 
@@ -279,8 +291,8 @@ def render_comparison(table: pd.DataFrame, names: Sequence[str]) -> str:
     """
     columns = (
         *(_text("verb", "asked"), _text("measure"), _condition("condition"), "cases", "series"),
-        *(_percent("first", names[0]), _percent("second", names[1]), _percent("difference")),
-        *(_percent("low", "95 % from"), _percent("high", "to")),
+        *(_compared("first", names[0]), _compared("second", names[1])),
+        *(_compared("difference"), _compared("low", "95 % from"), _compared("high", "to")),
         Column("verdict", words=lambda said: Cell(said, VERDICT_TONES.get(said, "none"))),
     )
     facts = {"first": names[0], "second": names[1], "sentences": in_sentences(table, names), "comparison": table}

@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from experiments.fleet.page import worst_severity_text
 from experiments.fleet.rows import LogRow, log_rows
+from experiments.page.numbers import fixed
 
 STANDING_COLUMNS = ("file", "verb", "outcome", "found_condition", "reason", "quantities", "against")
 """Columns of a store that show how bad a log is."""
@@ -88,4 +89,4 @@ def _worst(log: LogRow | None) -> str:
     """Return the severity nearest to or farthest beyond its limit, and its percentage of the limit."""
     if log is None or log.worst is None or not log.has_verdict:
         return ""
-    return f"{worst_severity_text(log)}, {100.0 * log.worst.share:.0f} % of the limit"
+    return f"{worst_severity_text(log)}, {fixed(100.0 * log.worst.share, 0)} % of the limit"

@@ -3,6 +3,7 @@ import pandas as pd
 import pytest
 
 from experiments.batch.compare import compare_studies, in_sentences
+from experiments.batch.pages import render_comparison
 from plant.errors import HydrostateError
 
 
@@ -96,3 +97,13 @@ def test_the_sentence_about_few_series_gives_no_interval() -> None:
         (about,) = [one for one in sentences if "error of bulk modulus" in one]
         assert ("95 % interval" in about) is there
         assert about.endswith("better" if there else "no difference shown")
+
+
+def test_a_small_difference_is_not_shown_as_nought_beside_an_interval_of_noughts() -> None:
+    """Before, the page showed "0.02, 0.02, 0.00, 0.00 to 0.00" for a difference of 0.0012 (0.0009 to 0.0032)."""
+    row = {"verb": "filter", "measure": "error of bulk modulus", "condition": "all", "cases": 9, "series": 9}
+    amounts = {"first": 0.0167, "second": 0.0179, "difference": 0.00119, "low": -0.00092, "high": 0.00323}
+    table = pd.DataFrame([{**row, **amounts, "unit": "%", "changed": "", "verdict": "no difference shown"}])
+    page = render_comparison(table, ("A", "B"))
+    for shown in ("0.0167", "0.0179", "0.0012", "\N{MINUS SIGN}0.0009", "0.0032"):
+        assert f'<td class="number">{shown}</td>' in page
