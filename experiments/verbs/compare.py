@@ -13,11 +13,11 @@ from experiments.command.terminal import emit, note, render_text, table
 commands = typer.Typer()
 
 
-@commands.command(epilog="Example: hydrostate compare before.csv after.csv --out comparison.html")
+@commands.command(epilog="Example: hydrostate compare before.csv after.csv --report comparison.html")
 def compare(
     first: Annotated[str, argument("A", "The first log, or the store of the first study.")],
     second: Annotated[str, argument("B", "The second log, or the store of the second study.")],
-    out: Annotated[Path | None, option("HTML", "Also write a page.", "--out", "-o")] = None,
+    out: Annotated[Path | None, option("HTML", "Also write a page.", "--out", "-o", "--report", "--html")] = None,
     plant: Plant = None,
     rig: RigFile = None,
     columns: Columns = None,
@@ -38,7 +38,7 @@ def compare(
     from plant.errors import HydrostateError
 
     if out is not None:
-        out = with_page_ending("--out", out)
+        out = with_page_ending("--report (--out)", out)
     files = [place for place in (first, second) if Path(place).is_file()]
     if len(files) == 2:
         from experiments.log_pages.two_logs import compare_logs

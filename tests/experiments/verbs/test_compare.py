@@ -52,7 +52,7 @@ def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_p
     for log, leakage in zip(logs, ("0", "1"), strict=True):
         how = ["--drive", "steps", "--duration", "2", "--sample-time", "2e-3", "--leakage-severity", leakage]
         assert CliRunner().invoke(app, ["simulate", *how, "--out", log]).exit_code == 0
-    shown = CliRunner().invoke(app, ["compare", *logs, "--out", str(tmp_path / "page.html")])
+    shown = CliRunner().invoke(app, ["compare", *logs, "--report", str(tmp_path / "page.html")])
     assert shown.exit_code == 0, shown.output
     title = next(line for line in shown.stdout.splitlines() if line.startswith("In the second log, "))
     assert "leakage" in title.partition(" higher")[0]
@@ -68,9 +68,9 @@ def test_two_logs_are_compared_on_the_terminal_on_a_page_and_for_a_program(tmp_p
 def test_a_page_with_another_ending_than_html_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("")
     both = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
-    done = CliRunner().invoke(app, ["compare", *both, "--out", str(tmp_path / "x.pdf")])
+    done = CliRunner().invoke(app, ["compare", *both, "--report", str(tmp_path / "x.pdf")])
     assert done.exit_code == 2
-    assert "--out must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(done.output.split())
+    assert "--report (--out) must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(done.output.split())
 
 
 def test_a_missing_log_is_refused_by_its_name(tmp_path: Path) -> None:
