@@ -244,9 +244,10 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
 
 def _ranking(results: Sequence[Result]) -> "Iterable[RenderableType]":
     from estimation.trust.card import percent
+    from plant.eha.model import EhaParameters
+    from plant.units import notes
 
-    names = list(results[0]["relative_std_percent"])
-    headings = [f"{name.replace('_', ' ')} [%]" for name in names]
+    headings = [f"{notes(EhaParameters)[name].meaning} [%]" for name in results[0]["relative_std_percent"]]
     shown = table("drive", "overall [%]", *headings, "stuck [%]", title=title_of(results[0], "drives"))
     for result in results:
         values = [result["overall_percent"], *result["relative_std_percent"].values(), result["stuck_percent"]]

@@ -47,6 +47,7 @@ def test_drives_are_ranked_from_best_to_worst() -> None:
     assert [one["rank"] for one in found] == [1, 2, 3, 4, 5]
     assert found[-1]["drive"] == "sine"
     shown = invoke("--rank", "--sensors", "position,velocity").stdout
+    assert "Coulomb friction a_3 [%]" in " ".join(shown.split())  # called as without --rank
     assert shown.index(found[0]["drive"]) < shown.index("sine")
     assert "overall [%]" in shown
 
