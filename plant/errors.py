@@ -189,5 +189,6 @@ def require_each_known(what: str, names: Sequence[str], known: Sequence[str]) ->
         If one is not among them, or comes twice.
     """
     for i, name in enumerate(names):
-        if name not in known or name in names[:i]:
-            raise HydrostateError(f"{what} must be one of {', '.join(known)}, once, got {name!r}")
+        require_known(what, name, known)
+        if name in names[:i]:
+            raise HydrostateError(f"{what} must be given once, got {name!r} twice")

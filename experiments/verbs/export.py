@@ -55,7 +55,11 @@ PlantName: TypeAlias = Annotated[
 ]
 Tune: TypeAlias = Annotated[bool, flag("--tune", "Tune the filter's noise levels to the log by maximum likelihood.")]
 States: TypeAlias = Annotated[
-    str, option("NAMES", "Parameters to estimate in addition to bulk modulus, comma-separated.")
+    str,
+    option(
+        "NAMES",
+        "Parameters to estimate in addition to bulk modulus, comma-separated: leakage, friction, air, or names.",
+    ),
 ]
 NoPressure: TypeAlias = Annotated[bool, flag("--no-pressure", "Ignore differential pressure even if it is logged.")]
 Step: TypeAlias = Annotated[float | None, option("S", "Time between samples [s].", show_default="the log's, else 1e-4")]
@@ -95,7 +99,7 @@ def c(
         files, about = _plant(bench, plant, sample_time or SAMPLE_TIME, name, precision)
     else:
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        files, about = _filter(bench, record, form, method, split_names(states), name, precision, tune=tune)
+        files, about = _filter(bench, record, form, method, _states(states), name, precision, tune=tune)
     written = write_files(out, files)
     found: dict[str, Any] = {"outcome": "ok", "folder": str(out), "files": written, **about}
     emit(json_text([found]) if as_json else f"{out}: {', '.join(written)}")
@@ -135,7 +139,7 @@ def fmu(
         from estimation.export.task import filter_task
 
         record = _bench_log(log, bench, load_columns(columns), sample_time, no_pressure=no_pressure)
-        problem = filter_task(record, bench.parameters, form, states=split_names(states), tuned=tune)
+        problem = filter_task(record, bench.parameters, form, states=_states(states), tuned=tune)
         content = filter_fmu(problem, method, fmi, name=name if name is not None else f"{form}_{method}")
     write_files(out.parent, {out.name: content})
     found = {"outcome": "ok", "file": str(out), "fmi": fmi}
@@ -191,6 +195,12 @@ def model(
         if as_json
         else f"{out}: {', '.join(written)}"
     )
+
+
+def _states(names: str) -> tuple[str, ...]:
+    from estimation.eha.by_filter import FilterOptions
+
+    return FilterOptions(states=split_names(names)).names
 
 
 def _filter(

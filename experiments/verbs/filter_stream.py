@@ -103,13 +103,13 @@ def filter_stream(
             sink(shown)
 
     stop_at_signals()
-    from estimation.eha.by_filter import GROUPS
+    from estimation.eha.by_filter import FilterOptions
     from estimation.eha.online import StreamFilterOptions
     from estimation.models.eha_forms import FORMS
 
     with ExitStack() as outputs:
         bench, named = load_rig(rig), load_columns(columns)
-        freed = tuple(one for name in split_names(states) for one in GROUPS.get(name, (name,)))
+        freed = FilterOptions(states=split_names(states)).names
         asked = StreamFilterOptions(bench.parameters, form, method, freed, tune)
         if form in FORMS and not freed:
             note(HEALTHY_ASSUMED.format(rig=bench.name))

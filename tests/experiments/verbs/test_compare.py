@@ -70,7 +70,9 @@ def test_a_page_with_another_ending_than_html_is_refused(tmp_path: Path) -> None
     both = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
     done = CliRunner().invoke(app, ["compare", *both, "--report", str(tmp_path / "x.pdf")])
     assert done.exit_code == 2
-    assert "--report (--out) must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(done.output.split())
+    assert "--report (--out) must end in .html, got 'x.pdf'; a browser prints the page as PDF" in " ".join(
+        done.output.split()
+    )
 
 
 def test_a_missing_log_is_refused_by_its_name(tmp_path: Path) -> None:

@@ -41,14 +41,15 @@ def test_an_exported_filter_has_the_rate_and_channels_of_the_log_and_compiles(lo
     compiled(tmp_path, read(tmp_path))
 
 
-def test_spaces_between_states_are_ignored(log: Path, tmp_path: Path) -> None:
-    asked = ("leakage_coefficient,flow_bias", "leakage_coefficient, flow_bias")
+def test_states_may_have_spaces_and_the_short_names_of_estimate(log: Path, tmp_path: Path) -> None:
+    """Before, `estimate --states leakage` and `filter --states leakage` worked, and `export c` refused it."""
+    asked = ("leakage_coefficient,flow_bias", "leakage_coefficient, flow_bias", "leakage")
     sources: list[dict[str, str]] = []
     for number, states in enumerate(asked):
         done = export("c", log, "--states", states, "--name", "mine", "--out", tmp_path / str(number))
         assert done.exit_code == 0, done.output
         sources.append(read(tmp_path / str(number)))
-    assert sources[0] == sources[1]
+    assert sources[0] == sources[1] == sources[2]
 
 
 def test_without_a_log_a_filter_or_a_plant_can_be_exported(tmp_path: Path) -> None:
