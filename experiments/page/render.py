@@ -69,7 +69,27 @@ def render_page(
     made = {"table": table, "folded": folded, "figure": figure, "chart": chart}
     made |= {"headings_of": _headings_of, "errata_of": linked_errata}
     page = _templates().get_template(template).render({**facts, **made})
-    return with_scripts(_UNBREAKABLE_SPACE.sub("\N{NO-BREAK SPACE}", visible_page(page)))
+    return with_scripts(_UNBREAKABLE_SPACE.sub("\N{NO-BREAK SPACE}", with_whole_options(visible_page(page))))
+
+
+_OPTIONS = re.compile(
+    r"<(?P<skipped>script|style|title|span class=\"option\").*?</(?:script|style|title|span)>"
+    r"|<[^>]*>|(?<![\w-])(?P<option>--[a-z][a-z-]*)",
+    re.DOTALL,
+)
+
+
+def with_whole_options(page: str) -> str:
+    """Return a page on which no line ends between the two hyphens of an option of the command.
+
+    Examples
+    --------
+    >>> with_whole_options('<p title="--rig">add --rig</p>')
+    '<p title="--rig">add <span class="option">--rig</span></p>'
+    """
+    return _OPTIONS.sub(
+        lambda found: f'<span class="option">{found["option"]}</span>' if found["option"] else found[0], page
+    )
 
 
 @cache

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.page.render import with_whole_options
 from experiments.page.tables import folded_tables
 
 pytestmark = pytest.mark.slow
@@ -138,4 +139,16 @@ def test_printing_shows_the_open_tables_and_the_checkbox_opens_all(browser: Any,
     assert shown() == [True, True]
     page.emulate_media(media="print")
     assert shown() == [True, True]
+    page.close()
+
+
+def test_no_line_ends_between_the_hyphens_of_an_option(browser: Any) -> None:
+    """Before, a page of a log with a wrong sign said "or with -" and, on the next line, "-columns"."""
+    style = (Path(__file__).parents[3] / "experiments/page/templates/report.css").read_text(encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    for count in range(20, 60):  # one of these ends a line just before the option
+        text = with_whole_options(f"<p>{'i' * count} {'i ' * 12}with --columns</p>")
+        page.set_content(f"<style>{style}</style>{text}")
+        assert page.locator(".option").evaluate("one => one.getClientRects().length") == 1
+        assert page.locator(".option").bounding_box()["height"] < 30.0
     page.close()
