@@ -99,14 +99,6 @@ def test_an_actuator_of_one_to_three_logs_says_since_when_it_is_past_its_limit(
     assert row_cells(actuator(leakages))[5] == said
 
 
-def test_a_severity_as_when_healthy_is_0_percent_of_its_limit_without_a_sign() -> None:
-    """Before, the table of a fleet showed -0 % where a value was a little better than healthy."""
-    kept = json.loads(store_row("P-1_1.csv", 0.9999)["quantities"])
-    sound = store_row("P-1_1.csv", 1.0, quantities=json.dumps({"leakage_flow": kept["leakage_flow"]}))
-    (row,) = actuator_rows(log_rows([sound], by_pattern(["P-1_1.csv"], "{actuator}_{date}.csv"), {}))
-    assert str(row_cells(row)[4]) == "0.0"
-
-
 def test_constant_leakage_raises_no_alarm() -> None:
     row = actuator(np.full(30, 1.5))
     assert row.state == "within"

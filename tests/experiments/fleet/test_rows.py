@@ -126,3 +126,11 @@ def test_the_state_of_an_actuator_is_that_of_its_last_readable_log() -> None:
 
 def test_every_state_has_a_description() -> None:
     assert all(words for words in STATES.values())
+
+
+def test_a_severity_as_when_healthy_is_0_percent_of_its_limit_without_a_sign() -> None:
+    """Before, the table of a fleet showed -0 % where a value was a little better than healthy."""
+    leakage = json.loads(store_row("P-1_1.csv", 0.9999)["quantities"])["leakage_flow"]
+    sound = store_row("P-1_1.csv", 1.0, quantities=json.dumps({"leakage_flow": leakage}))
+    (row,) = actuator_rows(log_rows([sound], by_pattern(["P-1_1.csv"], "{actuator}_{date}.csv"), {}))
+    assert str(row_cells(row)[4]) == "0.0"
