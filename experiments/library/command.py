@@ -31,7 +31,7 @@ def library(
     Each is from motor speed [rad/s] to velocity [m/s] at 1 ms, one per condition, identified on the circuit plant.
     With `--out` the folder gets `library.json` and a report. The report compares ARX, ARMAX, output error and
     Box-Jenkins on all nine conditions, shows orders and break frequencies beside the paper's, and says how fast the
-    test signal should switch. This takes half a minute; the last line of standard output is the path of the report.
+    test signal should switch. This takes about a minute; the last line of standard output is the path of the report.
     """
     if out is None:
         _show(file, seed, as_json)
