@@ -171,15 +171,14 @@ def _output_result(
 
 def _validated(found: "Identified", held: "Channels", named: str) -> dict[str, Any]:
     """Return the quality on other logs, and whether held-back blocks promised clearly more, with a warning then."""
-    from estimation.identification.free_run.model import FreeRunQuality
     from estimation.identification.free_run.validation_notes import validation_notes
     from plant.errors import LogWarning
 
     quality = quality_of(found.model, held, named)
-    worse = validation_notes(found.model, FreeRunQuality(**quality), found.expected_error, named)
+    worse = validation_notes(found.model, quality, found.expected_error, named)
     for note in worse:
         warnings.warn(LogWarning(note), stacklevel=2)
-    return {**quality, "clearly_worse": bool(worse)}
+    return {**vars(quality), "clearly_worse": bool(worse)}
 
 
 def _response(data: "Channels", log: str, path: Path) -> dict[str, Any]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.free_run.quality import FreeRunQuality
     from experiments.identification.of_columns import ColumnFit
     from plant.log.record import Record
 
@@ -52,7 +53,8 @@ def simulate_model(logs: Sequence[Path], path: Path, fit: "ColumnFit", *, as_jso
             record = record_of(log, (*inputs, outputs[index]), fit, assumed=model.sample_time)
             data = channels_of([record], inputs, outputs[index], model.sample_time)
             quality = quality_of(model, channels_of([record], inputs, outputs[index], model.sample_time, split=True))
-            results.append({"inputs": list(inputs), "output": outputs[index], "structure": model.structure, **quality})
+            about = {"inputs": list(inputs), "output": outputs[index], "structure": model.structure}
+            results.append({**about, **vars(quality)})
             if log in simulated:
                 write_simulated(model, data, paths_by_owner(simulated[log], outputs)[outputs[index]])
         message = clauses([_fit_text(one["output"], one["fit_percent"]) for one in results])
@@ -124,8 +126,8 @@ def record_of(log: Path, wanted: Sequence[str], fit: "ColumnFit", *, assumed: fl
     return without_repeated_rows(record, wanted)
 
 
-def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> dict[str, Any]:
-    """Return the fit of a model to its outputs, under the names of the JSON contract.
+def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") -> "FreeRunQuality":
+    """Return the fit of a model to its outputs.
 
     Parameters
     ----------
@@ -140,10 +142,10 @@ def quality_of(model: "FreeRunModel", data: "Channels", named: str = "the log") 
     """
     from estimation.identification.free_run.input_range import doubts_about_inputs
 
-    quality, judged = model.judged_quality(data.u, data.y)
-    for note in doubts_about_inputs(model, data, judged, named):
+    quality, runs = model.quality_and_runs(data.u, data.y)
+    for note in doubts_about_inputs(model, data, runs, named):
         warnings.warn(LogWarning(note), stacklevel=2)
-    return vars(quality)
+    return quality
 
 
 def _simulated_screen(results: Sequence[Result]) -> "Iterable[RenderableType]":

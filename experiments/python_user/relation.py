@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from estimation.identification.free_run.data import Channels
     from estimation.identification.free_run.model import FreeRunModel
+    from estimation.identification.free_run.quality import FreeRun
     from estimation.identification.state_space.dynamics import StateSpaceDynamics
     from plant.log.record import Record
 
@@ -103,14 +104,14 @@ class Relation(Shown):
         for one in self.models:
             record = records[one.sample_time]
             if record is None:
-                run, judged = one.judged_run(log)
-                u = np.asarray(log, dtype=np.float64).reshape(len(run), -1)
+                run = one.free_run(log)
+                u = np.asarray(log, dtype=np.float64).reshape(len(run.output), -1)
                 part = Channels(one.inputs, one.output, one.sample_time, (u,), (np.full(len(u), np.nan),))
             else:
                 part = channels_to_run(record, one.inputs, one.output, one.sample_time)
-                run, judged = one.judged_run(part.u[0], part.y[0])
-            runs.append(run)
-            _warn_of_inputs(one, part, None if judged is None else [judged])
+                run = one.free_run(part.u[0], part.y[0])
+            runs.append(run.output)
+            _warn_of_inputs(one, part, [run])
         return runs[0] if len(runs) == 1 else np.column_stack(runs)
 
     def validate(self, log: Any) -> "pd.DataFrame":
@@ -146,8 +147,8 @@ class Relation(Shown):
             if (record := records[one.sample_time]) is None:
                 refuse(f"a Log, a Record or a table with the channels is needed, got {type(log).__name__}")
             part = _channels(one, record, split=True)
-            quality, judged = one.judged_quality(part.u, part.y)
-            _warn_of_inputs(one, part, judged)
+            quality, ran = one.quality_and_runs(part.u, part.y)
+            _warn_of_inputs(one, part, ran)
             for note in validation_notes(one, quality, expected, "the log"):
                 warnings.warn(LogWarning(note), stacklevel=2)
             rows[one.output] = vars(quality)
@@ -287,12 +288,10 @@ def _record_of(log: Any, sample_time: float, names: Sequence[str]) -> "Record | 
     return None if record is None else without_repeated_rows(record, [name for name in names if name in record])
 
 
-def _warn_of_inputs(
-    model: "FreeRunModel", data: "Channels", judged: "Sequence[tuple[float, float]] | None" = None
-) -> None:
+def _warn_of_inputs(model: "FreeRunModel", data: "Channels", runs: "Sequence[FreeRun]") -> None:
     from estimation.identification.free_run.input_range import doubts_about_inputs
 
-    for note in doubts_about_inputs(model, data, judged):
+    for note in doubts_about_inputs(model, data, runs):
         warnings.warn(LogWarning(note), stacklevel=3)
 
 

@@ -50,14 +50,13 @@ def _with_error_model(found: Identified, data: Channels) -> Identified:
     if type(model.dynamics) not in CORRECTED or not found.sound or fed:
         return found
     part, by = liveliest_sections(in_scale(data, model.scaling), MOST_MODELLED), model.scaling
-    judged = [
-        model.judged_run(by.u_mean + by.u_std * u, by.y_mean + by.y_std * y)
-        for u, y in zip(part.u, part.y, strict=True)
+    runs = [
+        model.free_run(by.u_mean + by.u_std * u, by.y_mean + by.y_std * y) for u, y in zip(part.u, part.y, strict=True)
     ]
-    runs = [(run - by.y_mean) / by.y_std for run, _ in judged]
-    if any(linear_stands_in(errors) or not np.isfinite(run).all() for run, errors in judged):
+    if any(linear_stands_in(run.errors) or not np.isfinite(run.output).all() for run in runs):
         return found
-    error_model = error_model_of(runs, part, [model.dynamics.undetermined_outputs(y.size) for y in part.y])
+    scaled = [(run.output - by.y_mean) / by.y_std for run in runs]
+    error_model = error_model_of(scaled, part, [model.dynamics.undetermined_outputs(y.size) for y in part.y])
     if error_model is None:
         return found
     model, left = replace(model, error_model=error_model), error_model.error / error_model.plain_error

@@ -85,24 +85,6 @@ class ErrorModel:
         """Return degree and times of the polynomial, under the names of the JSON contract."""
         return {"degree": self.degree, "lags_samples": list(self.lags), "n_values": self.n_values}
 
-    def corrected(self, u: Array, run: Array) -> Array:
-        """Return a free run with its predicted error, or as it is if these inputs do not determine that.
-
-        Parameters
-        ----------
-        u : ndarray, shape (n, m)
-            Inputs, scaled.
-        run : ndarray, shape (n,)
-            Free run, scaled.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Output, scaled.
-        """
-        found = self.predicted(u, run)
-        return run if found is None else run + found
-
     def predicted(self, u: Array, run: Array) -> Array | None:
         """Return the predicted error of a free run, or None if these inputs do not determine it.
 

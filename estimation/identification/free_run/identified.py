@@ -6,7 +6,8 @@ from typing import Any
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
-from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.quality import FreeRunQuality
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 

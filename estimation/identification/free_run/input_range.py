@@ -6,12 +6,12 @@ from itertools import count
 import numpy as np
 
 from estimation.arrays import Array
-from estimation.identification.free_run.data import Channels, in_scale
+from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.fallback import linear_stands_in
-from estimation.identification.free_run.hammerstein_dynamics import HammersteinDynamics
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_variables import SIGNAL_MARGIN
+from estimation.identification.free_run.quality import FreeRun
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 
@@ -62,71 +62,32 @@ def _ends_of_input(model: FreeRunModel, index: int) -> Array | None:
     return None if model.error_model is None else model.error_model.ends[:, index + 1]
 
 
-def linear_fallback_notes(
-    model: FreeRunModel, data: Channels, judged: Sequence[tuple[float, float]] | None = None
-) -> list[Note]:
-    """Return a note if a linear model replaces a nonlinear one that these inputs do not determine.
+def linear_fallback_notes(model: FreeRunModel, runs: Sequence[FreeRun], output: str) -> list[Note]:
+    """Return a note if a linear model replaces a nonlinear one that the inputs of some runs do not determine.
 
     Parameters
     ----------
-    model : FreeRunModel
-        Models of other structures have none.
-    data : Channels
-        In units of the channels; inputs in the model's order.
-    judged : sequence of tuple of float, optional
-        Result of `FreeRunModel.judged_run` for each log, if it was run [dimensionless].
+    output : str
+        Name of the output for the reader.
 
     Returns
     -------
     list of Note
         One at most, for the log on which the nonlinear model is determined least.
     """
-    dynamics = model.dynamics
-    if not isinstance(dynamics, PolynomialDynamics | HammersteinDynamics) or dynamics.fallback is None:
-        return []
-    if judged is None:
-        one = in_scale(data, model.scaling)
-        told = (dynamics.judged_run(u, y)[1] for u, y in zip(one.u, one.y, strict=True))
-        judged = [errors for errors in told if errors is not None]
+    judged = [run.errors for run in runs if run.errors is not None]
     undetermined, linear = max([(0.0, 1.0), *judged], key=lambda pair: pair[0] / pair[1])
     if not linear_stands_in((undetermined, linear)):
         return []
     return [
         IdentificationCode.LINEAR_STANDS_IN.note(
-            output=data.output, structure=model.structure, undetermined=undetermined, linear=linear
+            output=output, structure=model.structure, undetermined=undetermined, linear=linear
         )
     ]
 
 
-def error_model_notes(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return a note if the error model is left out of the run of a log, because its inputs do not determine it.
-
-    Parameters
-    ----------
-    model : FreeRunModel
-        One without an error model has none.
-    data : Channels
-        In units of the channels; inputs in the model's order.
-
-    Returns
-    -------
-    list of Note
-        One at most.
-    """
-    if model.error_model is None:
-        return []
-    one = in_scale(data, model.scaling)
-    runs = ((u, model.dynamics.run(u, y)) for u, y in zip(one.u, one.y, strict=True))
-    if all(model.error_model.predicted(u, run) is not None for u, run in runs):
-        return []
-    return [IdentificationCode.ERROR_MODEL_LEFT_OUT.note(output=data.output, structure=model.structure)]
-
-
 def doubts_about_inputs(
-    model: FreeRunModel,
-    data: Channels,
-    judged: Sequence[tuple[float, float]] | None = None,
-    named: str = "the log",
+    model: FreeRunModel, data: Channels, runs: Sequence[FreeRun], named: str = "the log"
 ) -> list[Note]:
     """Return the notes on a run with these inputs.
 
@@ -136,8 +97,8 @@ def doubts_about_inputs(
         Any.
     data : Channels
         In units of the channels; inputs in the model's order.
-    judged : sequence of tuple of float, optional
-        As in `linear_fallback_notes` [dimensionless].
+    runs : sequence of FreeRun
+        The model's run of each log.
     named : str
         Name of the logs for the reader.
 
@@ -151,7 +112,9 @@ def doubts_about_inputs(
         dead_time = next(n for n in count(data.longest) if model.dynamics.undetermined_outputs(n + 1) == n)
         told = {"logs": named, "output": data.output, "longest": data.longest, "dead_time": dead_time}
         return [IdentificationCode.NOTHING_ANSWERED.note(**told)]
-    return linear_fallback_notes(model, data, judged) or [
-        *input_range_notes(model, data),
-        *error_model_notes(model, data),
-    ]
+    if replaced := linear_fallback_notes(model, runs, data.output):
+        return replaced
+    notes = input_range_notes(model, data)
+    if any(run.without_error_model for run in runs):
+        notes.append(IdentificationCode.ERROR_MODEL_LEFT_OUT.note(output=data.output, structure=model.structure))
+    return notes

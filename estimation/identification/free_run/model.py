@@ -17,6 +17,7 @@ from estimation.identification.free_run.hammerstein_dynamics import HammersteinD
 from estimation.identification.free_run.limited_dynamics import LimitedDynamics
 from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
+from estimation.identification.free_run.quality import FreeRun, FreeRunQuality
 from estimation.identification.state_space.dynamics import StateSpaceDynamics
 from plant.errors import HydrostateError
 from plant.log.formats.cells import values_of
@@ -41,24 +42,6 @@ KINDS: Mapping[str, Any] = {
     )
 }
 """Dynamics by their names in a saved model."""
-
-
-@dataclass(frozen=True)
-class FreeRunQuality:
-    """Quality of a model's free run and one-step prediction.
-
-    Parameters
-    ----------
-    fit_percent, rmse : float
-        Of the free run: 100 is perfect, 0 as good as the mean; root-mean-square error [output unit].
-    one_step_percent, one_step_rmse : float
-        Of the prediction one step ahead from measured outputs [output unit].
-    """
-
-    fit_percent: float
-    rmse: float
-    one_step_percent: float
-    one_step_rmse: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +107,10 @@ class FreeRunModel:
         ndarray, shape (n,)
             Output; NaN from where a polynomial model diverges.
         """
-        return self.judged_run(u, y)[0]
+        return self.free_run(u, y).output
 
-    def judged_run(self, u: ArrayLike, y: ArrayLike | None = None) -> tuple[Array, tuple[float, float] | None]:
-        """Return the free run, and the errors that decide whether a linear model replaces it, computed once for both.
+    def free_run(self, u: ArrayLike, y: ArrayLike | None = None) -> FreeRun:
+        """Return the free run with what was decided on the way.
 
         Parameters
         ----------
@@ -135,11 +118,6 @@ class FreeRunModel:
             Inputs in the model's order, without gaps.
         y : array_like, shape (n,), optional
             See `simulate`.
-
-        Returns
-        -------
-        tuple of ndarray, shape (n,), and tuple of float or None
-            Output, and the result of `Fallback.errors`; None for models without a fallback.
         """
         inputs, outputs = self._scaled(u, y)
         errors: tuple[float, float] | None = None
@@ -147,9 +125,11 @@ class FreeRunModel:
             run, errors = self.dynamics.judged_run(inputs, outputs)
         else:
             run = self.dynamics.run(inputs, outputs)
+        left_out = False
         if self.error_model is not None and not linear_stands_in(errors):
-            run = self.error_model.corrected(inputs, run)
-        return self.scaling.y_mean + self.scaling.y_std * run, errors
+            error = self.error_model.predicted(inputs, run)
+            left_out, run = error is None, run if error is None else run + error
+        return FreeRun(self.scaling.y_mean + self.scaling.y_std * run, errors, left_out)
 
     def predict(self, u: ArrayLike, y: ArrayLike) -> Array:
         """Return the prediction one step ahead from measured outputs, shape (n,); NaN where they are missing.
@@ -166,12 +146,23 @@ class FreeRunModel:
         ndarray, shape (n,)
             Output [output unit].
         """
-        if self.error_model is not None and isinstance(self.dynamics, OutputErrorDynamics):
+        if self._predicts_freely:
             return self.simulate(u, y)
         inputs, outputs = self._scaled(u, y)
-        if self.linear is not None and self.linear.noise_denominator.size > 1:
-            return self.linear.predict(self.scaling.u_mean[0] + self.scaling.u_std[0] * inputs[:, 0], np.asarray(y))
+        if (noisy := self._noise_model) is not None:
+            return noisy.predict(self.scaling.u_mean[0] + self.scaling.u_std[0] * inputs[:, 0], np.asarray(y))
         return self.scaling.y_mean + self.scaling.y_std * self.dynamics.one_step(inputs, outputs)
+
+    @property
+    def _noise_model(self) -> "LinearModel | None":
+        """The transfer function if its model of noise predicts from measured outputs."""
+        linear = self.linear if self.error_model is None else None
+        return linear if linear is not None and linear.noise_denominator.size > 1 else None
+
+    @property
+    def _predicts_freely(self) -> bool:
+        """Whether measured outputs do not improve the next prediction, which is then the free run."""
+        return isinstance(self.dynamics, OutputErrorDynamics) and self._noise_model is None
 
     def quality(self, u: Sequence[Array], y: Sequence[Array]) -> FreeRunQuality:
         """Return the quality of the model on logs, without the first outputs that a long dead time leaves undetermined.
@@ -183,12 +174,10 @@ class FreeRunModel:
         y : sequence of ndarray, shape (n,)
             Output of each log; NaN where missing.
         """
-        return self.judged_quality(u, y)[0]
+        return self.quality_and_runs(u, y)[0]
 
-    def judged_quality(
-        self, u: Sequence[Array], y: Sequence[Array]
-    ) -> tuple[FreeRunQuality, list[tuple[float, float]]]:
-        """Return the quality on logs, and the errors that decide on the linear fallback, from the same runs.
+    def quality_and_runs(self, u: Sequence[Array], y: Sequence[Array]) -> tuple[FreeRunQuality, list[FreeRun]]:
+        """Return the quality on logs, and the runs that it judges.
 
         Parameters
         ----------
@@ -196,18 +185,13 @@ class FreeRunModel:
             Inputs of each log.
         y : sequence of ndarray, shape (n,)
             Output of each log; NaN where missing.
-
-        Returns
-        -------
-        tuple of FreeRunQuality and list of tuple of float
-            The quality, and the result of `judged_run` for each log; empty for models without a fallback.
         """
         measured = np.concatenate([self._without_undetermined(one) for one in y])
-        runs = [self.judged_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
-        free = np.concatenate([run for run, _ in runs])
-        ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
-        quality = FreeRunQuality(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
-        return quality, [errors for _, errors in runs if errors is not None]
+        runs = [self.free_run(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)]
+        free = ahead = np.concatenate([run.output for run in runs])
+        if not self._predicts_freely:
+            ahead = np.concatenate([self.predict(one_u, one_y) for one_u, one_y in zip(u, y, strict=True)])
+        return FreeRunQuality.of(measured, free, ahead), runs
 
     def _without_undetermined(self, y: Array) -> Array:
         """Return an output without its first samples that depend, by a long dead time, on earlier inputs."""
@@ -332,17 +316,3 @@ class FreeRunModel:
             return cls(*names, *sizes, scaling, dynamics, error_model=error_model)
         except (KeyError, TypeError, ValueError) as error:
             raise HydrostateError(f"a saved model is not usable: {type(error).__name__} {error}") from error
-
-
-def _fit(measured: Array, found: Array, *, running: bool) -> tuple[float, float]:
-    """Return fit [%] and root-mean-square error; NaN without samples, or if the free run diverged."""
-    known = np.isfinite(measured) & (np.isfinite(found) | running)
-    left = (measured - found)[known]
-    if left.size == 0:
-        return float("nan"), float("nan")
-    if not np.isfinite(left).all():
-        return float("-inf"), float("inf")
-    spread = measured[known] - measured[known].mean()
-    power = float(spread @ spread)
-    fit = 100.0 * (1.0 - float(np.sqrt(left @ left / power))) if power > 0.0 else float("nan")
-    return fit, float(np.sqrt(np.mean(left**2)))

@@ -1,6 +1,7 @@
 """Whether a model does clearly worse on another log than on held-back blocks of the logs to which it was fitted."""
 
-from estimation.identification.free_run.model import FreeRunModel, FreeRunQuality
+from estimation.identification.free_run.model import FreeRunModel
+from estimation.identification.free_run.quality import FreeRunQuality
 from estimation.identification.notes import IdentificationCode
 from plant.notes import Note
 

@@ -73,9 +73,9 @@ def test_a_log_no_longer_than_the_dead_time_has_no_fit_and_a_note_with_the_reaso
     brief = channels(DELAY + 1)
     brief = replace(brief, u=(brief.u[0][:DELAY],), y=(brief.y[0][:DELAY],))
     assert np.isnan(model.quality(brief.u, brief.y).fit_percent)
-    (note,) = doubts_about_inputs(model, brief)
+    (note,) = doubts_about_inputs(model, brief, [])
     assert (note.code, note.data["longest"], note.data["dead_time"]) == ("nothing_answered", DELAY, DELAY)
-    assert doubts_about_inputs(model, channels()) == []
+    assert doubts_about_inputs(model, channels(), []) == []
 
 
 def test_an_output_equal_to_its_input_gives_a_sound_linear_model() -> None:

@@ -15,7 +15,6 @@ from estimation.identification.free_run.identified import Identified
 from estimation.identification.free_run.identify import identify_channels
 from estimation.identification.free_run.input_range import (
     doubts_about_inputs,
-    error_model_notes,
     input_range_notes,
 )
 from estimation.identification.free_run.model import FreeRunModel
@@ -60,7 +59,9 @@ def test_an_error_model_leaves_a_third_of_the_error_on_another_record() -> None:
     assert found is not None
     u, y = signals(5)
     run = linear_run(u)
-    before, after = np.std(y - run), np.std(y - found.corrected(u, run))
+    error = found.predicted(u, run)
+    assert error is not None
+    before, after = np.std(y - run), np.std(y - run - error)
     assert after < 0.35 * before
     assert found.error < 0.5 * found.plain_error
 
@@ -95,13 +96,17 @@ def test_products_of_three_are_tried_for_few_signals_only() -> None:
 def test_signals_beyond_their_range_count_as_at_its_ends() -> None:
     found = error_model()
     assert found is not None
+    agreed = replace(found, parts=np.array([found.values, found.values]))  # or such inputs would not determine it
     u, _ = signals(0)
     run = linear_run(u)
     low, high = found.ends
+    at_end = agreed.predicted(np.full_like(u, high[1]), np.full_like(run, low[0]))
+    assert at_end is not None
+    assert np.all(np.abs(at_end) > 0.1)
     for far in (1e2, 1e4):
-        ended = found.corrected(np.full_like(u, far), np.full_like(run, -far)) + far
-        at_end = found.corrected(np.full_like(u, high[1]), np.full_like(run, low[0])) - low[0]
-        np.testing.assert_allclose(ended, at_end, atol=1e-6)
+        ended = agreed.predicted(np.full_like(u, far), np.full_like(run, -far))
+        assert ended is not None
+        np.testing.assert_array_equal(ended, at_end)
 
 
 def test_an_error_that_fits_without_a_block_do_not_agree_on_is_not_corrected() -> None:
@@ -110,11 +115,10 @@ def test_an_error_that_fits_without_a_block_do_not_agree_on_is_not_corrected() -
     u, _ = signals(0)
     run = linear_run(u)
     apart = replace(found, parts=found.values + 100.0 * (found.parts - found.values))
-    np.testing.assert_array_equal(apart.corrected(u, run), run)
     assert apart.predicted(u, run) is None
-    assert not np.array_equal(found.corrected(u, run), run)
+    assert found.predicted(u, run) is not None
     grown = np.where(np.arange(SAMPLES) > 9, np.nan, run)
-    np.testing.assert_array_equal(found.corrected(u, grown), grown)
+    assert found.predicted(u, grown) is None
 
 
 def test_auto_adds_an_error_model_and_says_so() -> None:
@@ -159,9 +163,12 @@ def test_a_saved_error_model_that_does_not_fit_together_is_refused(change: dict[
 def test_a_long_log_is_corrected_piece_by_piece_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:
     found, (u, _) = error_model(), signals(5)
     assert found is not None
-    at_once = found.corrected(u, linear_run(u))
+    at_once = found.predicted(u, linear_run(u))
+    assert at_once is not None
     monkeypatch.setattr("estimation.identification.free_run.error_model.MOST_ROWS", 37)
-    np.testing.assert_allclose(found.corrected(u, linear_run(u)), at_once, rtol=1e-12)
+    in_pieces = found.predicted(u, linear_run(u))
+    assert in_pieces is not None
+    np.testing.assert_allclose(in_pieces, at_once, atol=1e-12)
 
 
 def test_a_prediction_one_step_ahead_includes_the_error_model_if_it_is_the_free_run() -> None:
@@ -184,10 +191,9 @@ def test_a_model_with_an_error_model_is_not_exported_and_warns_of_inputs_beyond_
 def test_a_run_without_the_error_model_says_so() -> None:
     model, (u, y) = identified().model, signals(7)
     assert model.error_model is not None
-    assert error_model_notes(model, channels(u, y)) == []
+    assert doubts_about_inputs(model, channels(u, y), [model.free_run(u, y)]) == []
     spread = model.error_model.values + 100.0 * (model.error_model.parts - model.error_model.values)
     apart = replace(model, error_model=replace(model.error_model, parts=spread))
-    (note,) = error_model_notes(apart, channels(u, y))
+    (note,) = doubts_about_inputs(apart, channels(u, y), [apart.free_run(u, y)])
     assert note.code == IdentificationCode.ERROR_MODEL_LEFT_OUT
-    assert doubts_about_inputs(apart, channels(u, y)) == [note]
     np.testing.assert_array_equal(apart.simulate(u, y), replace(model, error_model=None).simulate(u, y))

@@ -18,6 +18,7 @@ from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.polynomial_dynamics import PolynomialDynamics
 from estimation.identification.free_run.polynomial_variables import Variables
+from plant.notes import Note
 
 N = 400
 
@@ -30,6 +31,10 @@ def gain(value: float) -> LinearDynamics:
 def bend(value: float) -> HammersteinDynamics:
     """Return ``y = value u`` up to the limits of a saturation."""
     return HammersteinDynamics("saturation", np.array([-5.0, 5.0]), np.full(2, np.nan), gain(value))
+
+
+def notes_on_runs(model: FreeRunModel, data: Channels) -> list[Note]:
+    return linear_fallback_notes(model, [*map(model.free_run, data.u, data.y)], data.output)
 
 
 class Fails:
@@ -91,7 +96,7 @@ def test_the_held_back_error_of_a_nonlinearity_adds_to_its_uncertainty(
     again = FreeRunModel.from_dict(json.loads(json.dumps(model.to_dict())))
     assert again.simulate(u) == pytest.approx(run)
     near = 1.0 + 1e-3 * np.arange(20.0)
-    notes = linear_fallback_notes(again, channels_from([near[:, None]], [near], 1.0, ["u"], "y"))
+    notes = linear_fallback_notes(again, [again.free_run(near, near)], "y")
     assert [note.code for note in notes] == ([] if taken == "own" else ["linear_stands_in"])
     assert all("--structure hammerstein" in str(note) for note in notes)
     # a model that was requested is run as it is
@@ -211,12 +216,12 @@ def test_the_linear_model_runs_between_two_fitted_levels_if_the_nonlinear_fits_d
     assert isinstance(dynamics, PolynomialDynamics)
     assert dynamics.fallback is not None
     assert found.quality.fit_percent > 90.0
-    assert linear_fallback_notes(found.model, data) == []
+    assert notes_on_runs(found.model, data) == []
     spread = replace(
         dynamics.fallback, parts=tuple(_bent(one, 0.3 * k) for k, one in enumerate(dynamics.fallback.parts))
     )
     torn = replace(found.model, dynamics=replace(dynamics, fallback=spread))
-    (note,) = linear_fallback_notes(torn, between)
+    (note,) = notes_on_runs(torn, between)
     assert note.code == "linear_stands_in"
     assert note.data["undetermined"] > note.data["linear"]
     straight = replace(found.model, dynamics=dynamics.fallback.linear)
@@ -236,4 +241,4 @@ def test_a_requested_polynomial_model_has_no_linear_fallback(between: Channels) 
     found = identify_channels(between, structure="narx", order=1, delay=1).model
     assert isinstance(found.dynamics, PolynomialDynamics)
     assert found.dynamics.fallback is None
-    assert linear_fallback_notes(found, between) == []
+    assert notes_on_runs(found, between) == []

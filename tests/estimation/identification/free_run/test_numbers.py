@@ -22,8 +22,9 @@ from estimation.identification.free_run.linear_dynamics import LinearDynamics
 from estimation.identification.free_run.linear_fit import fit_linear
 from estimation.identification.free_run.linear_kernel import decay_rows
 from estimation.identification.free_run.linear_problem import Form, LinearFit, Problem
-from estimation.identification.free_run.model import FreeRunModel, _fit
+from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.free_run.other_structures import fit_other_structure
+from estimation.identification.free_run.quality import _fit
 from estimation.identification.free_run.transfer_function import linear_model
 from estimation.identification.search import criterion
 from tests.estimation.identification.free_run.made_channels import NOISE, N, U, answer, channels
