@@ -4,6 +4,7 @@ The spectrum of such a channel has zeros at all multiples of the sample rate ove
 actuator.
 """
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -35,29 +36,32 @@ DISTINCT = 2.5
 0.19 at most (decision 454)."""
 
 
-def without_overlapping_means(record: Record) -> tuple[Record, tuple[Note, ...]]:
+def without_overlapping_means(record: Record) -> tuple[Record, tuple[Note, ...], Mapping[str, float]]:
     """Return a log whose averaged pressures are means of rows that do not overlap.
 
     Returns
     -------
-    tuple of (Record, tuple of Note)
-        The log with one mean in so many rows, the first one in row ``rows - 1``, and a note for each channel. The same
-        log if its pressure was not averaged, or if position or speed was averaged as well.
+    tuple of (Record, tuple of Note, Mapping[str, float])
+        The log with one mean in so many rows, the first one in row ``rows - 1``; a note for each channel, and the
+        variance of a mean's noise [unit squared]. The same log if its pressure was not averaged, or if position or
+        speed was averaged as well.
     """
     rows, variance = averaged_rows(record[PRESSURE]) if PRESSURE in record else (1, 0.0)
     if rows == 1 or variance <= SMALLEST_VARIANCE[PRESSURE]:
-        return record, ()
+        return record, (), {}
     if record.sample_time < FAST and (rows % 2 == 0 or rows * record.sample_time > LONGEST_BLOCK):
-        return record, ()
+        return record, (), {}
     if any(averaged_rows(record[name])[0] > 1 for name in (POSITION, SPEED) if name in record):
-        return record, ()
+        return record, (), {}
+    pressures = [name for name in PRESSURES if name in record]
+    found = {name: (rows, variance) if name == PRESSURE else averaged_rows(record[name]) for name in pressures}
+    variances = {name: before / rows for name, (own, before) in found.items() if own == rows}
     changed, notes = dict[str, Array](), list[Note]()
-    for name in PRESSURES:
-        if name in record and (name == PRESSURE or averaged_rows(record[name])[0] == rows):
-            changed[name] = np.full(len(record), np.nan)
-            changed[name][rows - 1 :: rows] = record[name][rows - 1 :: rows]
-            notes.append(LoggerCode.AVERAGED.note(channel=name, rows=rows, span_ms=1e3 * rows * record.sample_time))
-    return record.replace(**changed), tuple(notes)
+    for name in variances:
+        changed[name] = np.full(len(record), np.nan)
+        changed[name][rows - 1 :: rows] = record[name][rows - 1 :: rows]
+        notes.append(LoggerCode.AVERAGED.note(channel=name, rows=rows, span_ms=1e3 * rows * record.sample_time))
+    return record.replace(**changed), tuple(notes), variances
 
 
 def averaged_rows(values: Array) -> tuple[int, float]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from estimation.log_checks.averaged import averaged_rows, without_overlapping_means
+from estimation.log_checks.averaged import without_overlapping_means
 from estimation.log_checks.channel_names import MEASURED, POSITION, PRESSURE, SPEED, VELOCITY
 from estimation.log_checks.channel_physics import channel_mistakes
 from estimation.log_checks.discontinuities import without_discontinuities
@@ -126,20 +126,19 @@ def clean_log(record: Record, parameters: EhaParameters) -> CleanLog:
         objections = steps = ()
     if VELOCITY in accused:  # the offset of a dead sensor says nothing
         offset = ()
-    every, (sound, filtered) = sound, without_overlapping_means(sound)
+    every, (sound, filtered, thinned) = sound, without_overlapping_means(sound)
     if not filtered:
         sound, filtered = without_correlated_noise(sound, natural_frequency(parameters))
+        channels = [str(note.data["channel"]) for note in filtered]
+        found = {name: independent_variance(sound[name]) for name in channels}
+        thinned = {name: one for name, one in found.items() if one is not None}
     as_logged = (*digits, *held, *twice, *dropouts, *alone)
     left_out = (*as_logged, *outliers, *clipped, *beyond, *steps, *hum, *offset, *late, *filtered)
-    variances = {**measurement_variances(sound, known), **_thinned_variances(sound, filtered, every)}
+    variances = {**measurement_variances(sound, known), **_at_least_rounding(thinned, every)}
     return CleanLog(sound, variances, left_out, objections, mistakes)
 
 
-def _thinned_variances(record: Record, filtered: tuple[Note, ...], every: Record) -> Mapping[str, float]:
-    """Return the variances of channels of which one sample in several was kept; rounding is determined from all."""
-    found = {str(note.data["channel"]): independent_variance(record[str(note.data["channel"])]) for note in filtered}
-    means = [str(note.data["channel"]) for note in filtered if note.code == LoggerCode.AVERAGED]
-    found |= {name: variance / rows for name in means for rows, variance in (averaged_rows(every[name]),)}
-    rounded = {name: rounded_variance(every[name]) for name in found}
+def _at_least_rounding(variances: Mapping[str, float], every: Record) -> Mapping[str, float]:
+    """Return variances of channels of which one sample in several was kept, at least those of all samples' rounding."""
     least = SMALLEST_VARIANCE[PRESSURE]
-    return {name: max(one, least, rounded[name]) for name, one in found.items() if one is not None}
+    return {name: max(one, least, rounded_variance(every[name])) for name, one in variances.items()}

@@ -48,7 +48,7 @@ def test_the_rows_of_an_average_and_the_noise_before_it_are_found_under_any_driv
 def test_a_log_whose_pressure_was_not_averaged_is_unchanged(drive: str, sensors: Sensors) -> None:
     for sample_time in (1e-3, 1e-4):
         record = log(drive, sensors, sample_time)
-        assert without_overlapping_means(record) == (record, ())
+        assert without_overlapping_means(record) == (record, (), {})
 
 
 def test_first_order_and_binomial_filters_are_no_average() -> None:
@@ -75,7 +75,7 @@ def test_one_mean_in_so_many_rows_is_kept_with_the_noise_of_a_mean() -> None:
 def test_channels_that_were_all_averaged_need_no_average_of_the_model() -> None:
     record = log("steps")
     alike = record.replace(**{name: over_last(record[name], 5) for name in (PRESSURE, SPEED)})
-    assert without_overlapping_means(alike) == (alike, ())
+    assert without_overlapping_means(alike) == (alike, (), {})
 
 
 def test_means_of_a_fast_log_take_the_place_of_its_blocks_only_if_they_have_a_middle_row() -> None:
