@@ -12,7 +12,6 @@ from plant.arrays import Array
 from plant.errors import HydrostateError, LogError, NoMemoryError
 from plant.log.columns import Column
 from plant.log.formats.csv import open_csv
-from plant.log.formats.mat4_reader import is_version_4
 from plant.log.formats.packed import require_regular
 from plant.log.formats.repeated_clocks import without_repeated_clocks
 from plant.log.formats.split_seconds import with_joined_seconds
@@ -111,7 +110,12 @@ def format_of(path: Path) -> str:
         return "hdf5"
     if start[126:128] in (b"IM", b"MI") and (start.startswith(b"MATLAB") or start[124:125] in (b"\x00", b"\x01")):
         return "mat"
-    return "mat" if is_version_4(start) else _by_suffix(path, start)
+    if b"\0" in start[:4]:  # as in the first integer of a MAT of version 4
+        from plant.log.formats.mat4_reader import is_version_4
+
+        if is_version_4(start):
+            return "mat"
+    return _by_suffix(path, start)
 
 
 def _format_in_zip(path: Path) -> str:
