@@ -69,7 +69,7 @@ class EquationsFit:
         LogError
             If an input is missing or has gaps.
         HydrostateError
-            If a state that is named is none.
+            If ``initial`` names something that is not a state.
         """
         return predicted_outputs(self, record, initial or {})
 
@@ -179,7 +179,7 @@ def simulated_outputs(
     Raises
     ------
     HydrostateError
-        If a name is none of the parameters or states, or the equations run away.
+        If a name is neither a parameter nor a state, or the equations run away.
     """
     strangers = [name for name in values if name not in equations.parameters]
     if strangers:

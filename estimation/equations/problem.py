@@ -335,7 +335,7 @@ def known_noise(equations: Equations, noise: Mapping[str, float]) -> Array:
     Raises
     ------
     HydrostateError
-        If a name is none of the outputs, or a deviation is not positive.
+        If a name is not an output, or a deviation is not positive.
     """
     for name, value in noise.items():
         if name not in equations.outputs:

@@ -85,7 +85,7 @@ def filter_in_c(problem: FilterProblem, method: str = "ekf", *, name: str, preci
     Raises
     ------
     HydrostateError
-        If method or precision is not known, a setting is not what it must be, or the name is none of C.
+        If method or precision is not known, a setting is not what it must be, or C does not allow the name.
     """
     require_known("a method that can be exported", method, EXPORTED)
     real, name = precision_of(precision), checked_name(name)

@@ -33,7 +33,7 @@ def model_in_c(model: FreeRunModel, *, name: str, precision: str = "double") -> 
     Raises
     ------
     HydrostateError
-        If the model is not linear or has limits, the name is none of C, or the precision is not known.
+        If the model is not linear or has limits, C does not allow the name, or the precision is not known.
     """
     require_transfer_function(model)
     real, name = precision_of(precision), checked_name(name)

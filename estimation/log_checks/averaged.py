@@ -75,7 +75,7 @@ def averaged_rows(values: Array) -> tuple[int, float]:
     Returns
     -------
     tuple of (int, float)
-        Rows, 1 if it was not averaged, or if its spectrum is no mean's; variance [unit squared].
+        Rows, 1 if it was not averaged, or if its spectrum is not that of a mean; variance [unit squared].
 
     Examples
     --------

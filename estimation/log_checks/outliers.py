@@ -216,7 +216,7 @@ def sorting_exchanges(count: int) -> tuple[tuple[int, int], ...]:
 def _without_end_outliers(seen: Array, noise: float) -> Array:
     """Return a channel without those of its first and last samples that are a full range beyond all others.
 
-    One that its neighbours lead to is none: a log may begin at rest, and show how the motor speeds up.
+    A sample that its neighbours lead up to is kept: a log may begin at rest, and show how the motor speeds up.
     """
     inner = seen[ENDS:-ENDS]
     low, high = float(np.nanmin(inner)), float(np.nanmax(inner))

@@ -44,7 +44,7 @@ RESOLVED = 1e3
 """Travel of a position in a wrong unit, over its noise; a stuck piston has less [dimensionless]."""
 
 LENGTH_ALONE = 100.0
-"""Factor of a slip of length from which it is none of motor speed [dimensionless]."""
+"""Factor from which a slip is one of length, because no slip of motor speed is so large [dimensionless]."""
 
 UNKNOWN_RIG = "another unit, or a rig file of another actuator"
 LOSSY_UNIT = "another unit, such as mm read as m where much of the flow is lost, or a rig file of another actuator"

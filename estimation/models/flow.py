@@ -291,7 +291,7 @@ FLOW_FORM = GreyBoxModel(
     linear=(("speed_lead", 1e-5),),
     jump=(0.5, -0.5),
 )
-"""The flow form with its unknowns, balanced by volume; friction is none of them."""
+"""The flow form with its unknowns, balanced by volume, without friction."""
 
 STIFFNESS = "accumulator_stiffness"
 """Rise of the inner circuit's pressure per volume of oil that the chambers return to it [Pa/m^3]. Without it, bulk

@@ -142,7 +142,7 @@ def covariance(slopes: Array) -> Array:
 
 
 def _determined_covariance(slopes: Array) -> Array:
-    """Return the same in the directions that the channels determine, and zero in all others: no step leads there."""
+    """Return the covariance in directions that the channels determine, and zero in others: no step leads there."""
     normal, sizes = _normalised(slopes)
     return np.linalg.pinv(normal, rcond=_LEAST_KNOWN) / sizes
 

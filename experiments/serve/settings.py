@@ -63,7 +63,7 @@ class Settings:
     Raises
     ------
     HydrostateError
-        If a required token is missing or too short, or the address is none.
+        If a required token is missing or too short, or the address is not one.
     """
 
     folder: Path

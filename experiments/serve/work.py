@@ -239,7 +239,7 @@ def _is_full(error: Exception) -> bool:
 
 
 def _write(task: Task, page: str) -> None:
-    """Write the page of a log; on a full disk there is none, but the result is not lost."""
+    """Write the page of a log. If the disk is full, it is left out, and the result is kept."""
     try:
         with replacing(task.page) as file:
             file.write(page.encode())

@@ -47,7 +47,7 @@ def load_state(path: Path) -> tuple[dict[str, Array], float, float]:
     Raises
     ------
     HydrostateError
-        If the file cannot be read or is none of a watch.
+        If the file cannot be read, or is not a saved watch.
     """
     values = read_kept(path, FORMAT)
     return values, float(values.pop("sample_time")), float(values.pop("travelled"))

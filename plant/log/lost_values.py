@@ -22,7 +22,7 @@ KNOWN, IN_A_ROW = 100, 50
 
 
 class LostInStream:
-    """The same test for samples of a stream.
+    """Tells which samples of a stream are numbers that a logger writes for lost ones.
 
     A number is lost if it lies outside the range of all earlier samples by more than that range. A number that stays is
     accepted after `IN_A_ROW` samples.

@@ -62,7 +62,7 @@ def losses(fits: Sequence[GreyBoxFit], weights: Array) -> tuple[Array, Array]:
 
 
 def _losses_of_fit(fit: GreyBoxFit) -> tuple[Array, Array]:
-    """Return the same of one fit, whose unknowns are logarithms."""
+    """Return the losses of one fit, whose unknowns are logarithms, and their covariance."""
     names = (LEAKAGE, DRAIN, BIAS)
     across, drain, bias = (fit.values[name] for name in names)
     found = np.array([across + DRAIN_SHARE * drain, bias])

@@ -307,7 +307,7 @@ class FreedProblem(Problem):
         return found[0] if len(found) == 1 else np.concatenate(found, axis=-1)
 
     def _in_groups(self, rows: Array, drives: Array | None, variance: Array, most: int = MOST_LANES) -> list[Array]:
-        """Return the same in groups of rows, of which ``most`` run side by side."""
+        """Return the residuals by groups of rows, of which up to ``most`` run side by side."""
         if len(rows) == 1:  # a single run is cheaper without lanes
             spend(self.log)
             return [self._single_run(rows[0], drives, variance)[..., None]]

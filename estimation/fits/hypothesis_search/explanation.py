@@ -119,5 +119,5 @@ class Explanation:
 
     @property
     def in_detail(self) -> "Explanation":
-        """The same with the parameters free that matter to the last digits only, see `with_details`."""
+        """The explanation with those parameters free, too, that change its last digits only; see `with_details`."""
         return self.detailing() or self

@@ -106,7 +106,7 @@ class SharedState:
         return partial(self._at, problem)
 
     def at_each(self, problem: FreedProblem) -> Callable[[Sequence[Array]], list[Point]]:
-        """Return the same for several points side by side."""
+        """Return a function that gives the cost at several points side by side, with its work counted."""
         return partial(self._at_each, problem)
 
     def _at(self, problem: FreedProblem, theta: Array) -> Point:

@@ -45,7 +45,7 @@ def believable_candidate(candidates: Sequence[Candidate], data: Channels, by: Sc
 def _with_believable_delay(
     candidates: Sequence[Candidate], data: Channels, by: Scaling
 ) -> tuple[Candidate, list[Note]]:
-    """Return the same; a model that rings above the band of the inputs is treated like any other."""
+    """Return the best model whose dead time and sizes are believed, whether or not it rings above the inputs' band."""
     best, notes = _with_believable_size(candidates, data, by)
     prompt = [one for one in candidates if max(one.form.delays) <= 1]
     if max(best.form.delays) > 1 and prompt:
@@ -58,7 +58,7 @@ def _with_believable_delay(
 
 
 def _with_believable_size(candidates: Sequence[Candidate], data: Channels, by: Scaling) -> tuple[Candidate, list[Note]]:
-    """Return the same; a dead time is treated like any other size."""
+    """Return the best model whose sizes are believed; its dead time counts as one of them."""
     notes: list[Note] = []
     best = chosen_linear(candidates)
     # a time constant bounded by the record's length acts nearly like an integrator, so it is no alternative to one

@@ -55,7 +55,7 @@ class HammersteinDynamics(OutputErrorDynamics):
         return self.judged_run(u, y)[0]
 
     def judged_run(self, u: Array, y: Array) -> tuple[Array, tuple[float, float] | None]:
-        """Return the same with the expected errors of both models.
+        """Return the free run with the expected errors of this model and of the linear one.
 
         Parameters
         ----------

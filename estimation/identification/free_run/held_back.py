@@ -51,7 +51,7 @@ class JudgedModel:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ComparedModel(JudgedModel):
-    """The same, with a criterion that favours smaller models.
+    """A model that was judged on held-back blocks, and by a criterion that favours smaller models.
 
     Parameters
     ----------

@@ -68,9 +68,9 @@ class Task:
 
     @property
     def free(self) -> "Task | None":
-        """The same with sizes that the data choose; None where none is given.
+        """The task with sizes that the data choose; None if no size was given.
 
-        What a given size that is too large or too small leaves may look like a limit or a walk.
+        A given size that is too large or too small may leave errors that look like a limit or a walk.
         """
         orders = list(
             range(1, max(LEAST_COMPARED_ORDER, *self.orders) + 1)

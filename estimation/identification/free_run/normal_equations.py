@@ -179,7 +179,7 @@ class NormalEquations:
         return gram, right
 
     def sums_beside(self, left: Array, others: slice) -> tuple[Array, Array, Array]:
-        """Return the same if some values are only compared: their products with each other are not summed.
+        """Return the sums if some values are only compared, without the products of these with each other.
 
         Parameters
         ----------

@@ -32,7 +32,7 @@ def explains(cost: float, refit: Callable[[Channels], float], data: Channels) ->
     cost : float
         Sum of squared residuals with the inputs as measured [dimensionless].
     refit : callable
-        The same for a fit to other data; infinite if there is none.
+        From other data to the sum of squared residuals of a fit to them, infinite without a fit [dimensionless].
     data : Channels
         Scaled.
 
@@ -48,7 +48,7 @@ def explains(cost: float, refit: Callable[[Channels], float], data: Channels) ->
 
 
 def linear_explains(fit: LinearFit, data: Channels) -> bool:
-    """Return the same for a linear model, with its poles fitted again to each order of the inputs.
+    """Return whether inputs explain the output by a linear model, whose poles are fitted again to each order of them.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def linear_explains(fit: LinearFit, data: Channels) -> bool:
 
 
 def bend_explains(fit: HammersteinFit, data: Channels) -> bool:
-    """Return the same for a model with a nonlinearity at its input.
+    """Return whether the input explains the output by a model with a nonlinearity at its input.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def bend_explains(fit: HammersteinFit, data: Channels) -> bool:
 
 
 def polynomial_explains(found: PolynomialCandidate, data: Channels) -> bool:
-    """Return the same for a polynomial model.
+    """Return whether inputs explain the output by a polynomial model.
 
     Parameters
     ----------

@@ -62,14 +62,14 @@ def step_response(model: LinearModel, count: int) -> StepResponse:
 
 
 def _exact_slopes(model: LinearModel, step: Array) -> Array:
-    """Return the derivative by the coefficients, shape (n, p)."""
+    """Return the derivative of the response by the coefficients, shape (n, p)."""
     structure = Structure(model.free_numerator.size, model.denominator.size - 1, model.delay)
     theta = np.concatenate([model.free_numerator, model.denominator[1:], np.zeros(structure.n_initial)])
     return sensitivities(structure, theta, step)[:, : model.covariance.shape[0]]
 
 
 def _difference_slopes(model: LinearModel, step: Array) -> Array:
-    """Return the same by central differences, of a model in continuous time."""
+    """Return that derivative of a model in continuous time, by central differences."""
     values = np.concatenate([model.free_numerator, model.denominator[1:]])
     stds = np.sqrt(np.diag(model.covariance))
     columns: list[Array] = []

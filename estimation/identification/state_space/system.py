@@ -107,7 +107,7 @@ class StateSpace:
 
     @property
     def dc_gain_std(self) -> Array:
-        """Its standard deviation, likewise."""
+        """Standard deviation of the steady gain, shape (p, m) [output unit per input unit]."""
         return self._deviation(self.response(1.0)[1].real)
 
     @property

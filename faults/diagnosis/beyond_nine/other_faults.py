@@ -203,7 +203,7 @@ def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator)
 def _with_sound_searched_again(beside: _FaultyCircuits, runs: Array) -> _FaultyCircuits:
     """Return the circuits with the sound one searched again from each faulty one that is likelier, and once anew.
 
-    A search may end short of the best: a fault that gains only for that reason is none.
+    A search may end short of the best, and a fault that is likelier only for that reason is not taken.
     """
     asked, actuator = list[Fault](), beside.sound.actuator
     while beside.shown_fault is not None and (leading := beside.leading)[0] not in asked:

@@ -71,7 +71,7 @@ def is_followed_roughly(blocks: Blocks, fit: PointFit) -> bool:
 
 
 def remaining_doubts(doubts: Sequence[Note], blocks: Blocks, fit: PointFit) -> tuple[Note, ...]:
-    """Return the remaining objections given a circuit; a failed fit of motion is none if its form lacks what a log has.
+    """Return the remaining objections given a circuit, without a fit of motion that failed for what its form lacks.
 
     The motion form knows neither drift nor stops nor a start in motion. A circuit, whose beginning does not count,
     follows such logs.

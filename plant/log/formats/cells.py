@@ -80,7 +80,7 @@ def numbers(values: NDArray[Any], name: str, source: str) -> Array:
     Warns
     -----
     LogWarning
-        If fewer are none.
+        If a few values, at most 1 %, are no real numbers.
     """
     if values.ndim != 1:
         raise LogError(f"column {name[:80]!r} must be one-dimensional, got shape {values.shape}", source)

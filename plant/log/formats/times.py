@@ -48,7 +48,7 @@ def universal_times(values: "np.ndarray[Any, Any]", name: str, source: str) -> A
     Raises
     ------
     LogError
-        If a value is none.
+        If a value is no time.
     """
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]")
