@@ -26,7 +26,15 @@ class FreeRunQuality:
 
     @classmethod
     def of(cls, measured: Array, free: Array, ahead: Array) -> "FreeRunQuality":
-        """Return the quality of a free run and of a prediction one step ahead; NaN in the latter is left out."""
+        """Return the quality of a free run and of a prediction one step ahead.
+
+        Parameters
+        ----------
+        measured, free : ndarray, shape (n,)
+            Output, NaN where missing, and its free run [output unit].
+        ahead : ndarray, shape (n,)
+            The prediction; NaN where there is none [output unit].
+        """
         return cls(*_fit(measured, free, running=True), *_fit(measured, ahead, running=False))
 
 
