@@ -38,6 +38,7 @@ def test_a_controller_that_answers_within_one_sample_is_named(structure: str) ->
         assert "feedback_at_once" in codes(u, y, structure=structure, order=1, delay=0)
 
 
+@pytest.mark.slow
 def test_box_jenkins_with_a_delay_holds_in_such_a_loop_and_is_not_accused() -> None:
     off = {0: list[float](), 1: list[float]()}
     for seed in range(6):
@@ -57,6 +58,7 @@ def test_box_jenkins_with_a_delay_holds_in_such_a_loop_and_is_not_accused() -> N
     assert float(np.mean(np.square(off[1]))) < 1.6**2
 
 
+@pytest.mark.slow
 def test_a_nonlinear_model_of_a_closed_loop_says_so_however_well_it_fits() -> None:
     u, y = at_once_loop(1)
     with pytest.warns(LogWarning, match="closed loop"):
