@@ -199,8 +199,7 @@ def blocks_of(record: Record) -> Blocks:
             f"the log lasts {record.duration:.3g} s, but a diagnosis needs {least:.3g} s or more; log 10 s of steps "
             "at several speeds"
         )
-    slow, rows = bridged_slow_channel(record[PRESSURE]) if PRESSURE in record else (None, 1)
-    given = record if slow is None or rows == 1 else record.replace(**{PRESSURE: slow})
+    given, rows = _without_slow_channels(record, pooled)
     whole = {name: _pooled(given[name], pooled)[: count * block + 1] for name in record if name in _NEEDED}
     velocity = _velocity(whole, block, sample_time)
     if velocity is None:
@@ -213,9 +212,13 @@ def blocks_of(record: Record) -> Blocks:
     velocity = np.where(blind | _gap_blocks(whole.get("position_m"), block), np.nan, velocity)
     pressure = None if pressure is None else np.where(blind, np.nan, pressure)
     noise, course = _noise(whole, block, sample_time), whole.get(LEAKAGE_COURSE)
-    if pressure is not None and rows > 1:
-        # a block holds fewer samples of pressure, and interpolated values between them add no noise
-        noise[-1] = (measurement_variances(record, [PRESSURE])[PRESSURE] * rows / (block * pooled)) ** 0.5
+    if pressure is not None and PRESSURE in rows:
+        noise[-1] = _slow_noise(record, PRESSURE, rows[PRESSURE] / (block * pooled))
+    if "velocity_m_s" in rows and not _uses_position(whole):
+        noise[0] = _slow_noise(record, "velocity_m_s", rows["velocity_m_s"] / (block * pooled))
+    elif "position_m" in rows:
+        share = 2.0 * min(1.0, rows["position_m"] / pooled)
+        noise[0] = (position_variance(record["position_m"]) * share) ** 0.5 / (block * sample_time)
     return Blocks(
         speed,
         sample_time,
@@ -229,6 +232,26 @@ def blocks_of(record: Record) -> Blocks:
         differenced=_uses_position(whole),
         **beginning_of(record, whole.get(PRESSURE), velocity)._asdict(),
     )
+
+
+def _without_slow_channels(record: Record, pooled: int) -> tuple[Record, Mapping[str, int]]:
+    """Return a log without the gaps of channels that have a sample only every so many rows, and that number by channel.
+
+    A mean over rows most of which are missing is unknown. Where none is taken, position and speed are bridged later.
+    """
+    names = [one for one in (*_MOTION, PRESSURE) if one in record and (pooled > 1 or one in ("velocity_m_s", PRESSURE))]
+    bridges = {name: bridged_slow_channel(record[name]) for name in names}
+    slow = {name: (values, rows) for name, (values, rows) in bridges.items() if rows > 1}
+    given = record.replace(**{name: values for name, (values, _) in slow.items()}) if slow else record
+    return given, {name: rows for name, (_, rows) in slow.items()}
+
+
+def _slow_noise(record: Record, channel: str, share: float) -> float:
+    """Return the noise of a slow channel's block means: blocks hold fewer samples, and lines between them add none.
+
+    ``share`` is the variance of a mean over that of a sample [dimensionless].
+    """
+    return (measurement_variances(record, [channel])[channel] * share) ** 0.5
 
 
 def _samples_in_one(record: Record) -> int:
@@ -293,7 +316,8 @@ def _noise(whole: Mapping[str, Array], block: int, sample_time: float) -> Array:
     return np.array(noise)
 
 
-_NEEDED = ("motor_speed_rad_s", "position_m", "velocity_m_s", PRESSURE, LEAKAGE_COURSE)
+_MOTION = ("motor_speed_rad_s", "position_m", "velocity_m_s")
+_NEEDED = (*_MOTION, PRESSURE, LEAKAGE_COURSE)
 
 
 def _pooled(values: Array, pooled: int) -> Array:

@@ -89,3 +89,21 @@ def test_only_fast_logs_are_averaged_and_less_if_their_speed_is_rough(
 def test_a_binary_signal_is_averaged_less_than_steps_and_sines(drive: str, pooled: int) -> None:
     speed = make_drive(drive, 3.0, 1e-4, HEALTHY, np.random.default_rng(1))
     assert blocks_of(simulate(CIRCUIT, speed, 1e-4, circuit_of(HEALTHY))).sample_time == pytest.approx(pooled * 1e-4)
+
+
+@pytest.mark.parametrize(("channel", "rows"), [("position_m", 5), ("velocity_m_s", 5), ("motor_speed_rad_s", 5)])
+def test_a_fast_log_with_a_channel_that_is_sampled_more_slowly_has_the_blocks_of_the_whole_one(
+    channel: str, rows: int
+) -> None:
+    rng = np.random.default_rng(5)
+    drive = make_drive("multisine", 1.0, 2e-4, HEALTHY, rng)
+    whole = simulate(CIRCUIT, drive, 2e-4, HEALTHY, sensors=RIG, rng=rng)
+    whole = whole.replace(position_m=None) if channel == "velocity_m_s" else whole
+    rare = np.where(np.arange(len(whole)) % rows == 0, whole[channel], np.nan)
+    slow, full = blocks_of(whole.replace(**{channel: rare})), blocks_of(whole)
+    assert np.all(np.isfinite(slow.velocity))
+    left = np.abs(slow.velocity - full.velocity)
+    assert float(np.max(left)) < 5.0 * float(np.hypot(slow.noise[0], full.noise[0]))
+    assert slow.noise[0] >= 0.9 * full.noise[0]
+    assert slow.noise[0] < 1.2 * rows**0.5 * full.noise[0]
+    assert slow.speed == pytest.approx(full.speed, abs=0.03 * float(np.ptp(full.speed)))
