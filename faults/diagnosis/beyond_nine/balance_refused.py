@@ -26,12 +26,14 @@ RESIDUAL_REASONS = {
     EstimateCode.PRESSURE_SMOOTHED,
     EstimateCode.CHANNEL_LATE,
     EstimateCode.TEETH_LEFT,
+    EstimateCode.SEARCH_ENDED,
     EstimateCode.INNOVATIONS_LARGE,
     EstimateCode.INNOVATIONS_FOLLOW_DRIVE,
     EstimateCode.INNOVATIONS_BESIDE_DRIVE,
     EstimateCode.ESTIMATE_WANDERS,
 }
-"""Reasons that state the size of the balance's residuals, and none that names a cause."""
+"""Reasons that state the size of the balance's residuals, or that the search for their cause was too long, and none
+that names a cause."""
 
 CLOSE_RESIDUALS = (0.03, 0.04)
 """Share of velocity and of pressure, root mean square, up to which a circuit follows a log closely [dimensionless]: a

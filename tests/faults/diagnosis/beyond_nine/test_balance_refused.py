@@ -54,6 +54,11 @@ def test_a_refused_balance_keeps_its_class_if_a_circuit_follows_closely_and_no_f
     assert 0.0 < said.data["velocity_percent"] < 100.0 * CLOSE_RESIDUALS[0]
 
 
+def test_a_class_stands_if_the_search_for_the_cause_of_residuals_was_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    said = stands(monkeypatch, (CORRELATED, EstimateCode.SEARCH_ENDED.note()))
+    assert said is not None
+
+
 @pytest.mark.parametrize(
     "change",
     [
