@@ -93,8 +93,8 @@ class ClassCode(Code):
         "the nine conditions, keeps a probability of {percent:.0f} %"
     )
     OIL_STIFFER_CLASS = (
-        "without pressure, the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, "
-        "or a wrong rig file); the conditions were compared at that value"
+        "the circuit that fits has {ratio:.2g} times the bulk modulus in the rig file (another oil, or a wrong rig "
+        "file); the conditions were compared at that value"
     )
     NOT_EXCLUDED = (
         "without differential_pressure_pa, other faults explain the log about as well and are not excluded: {faults}; "

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimation.eha.bulk_modulus import EstimateOptions
+from estimation.eha.bulk_modulus import FITTED, EstimateOptions
 from estimation.eha.entrained_air import amount_of_air
 from estimation.eha.estimate import checked_estimate, finding_of
 from estimation.eha.result import BulkModulusEstimate
@@ -256,18 +256,18 @@ def _diagnose_with_delivery(
 def _diagnose_around(
     log: CleanLog, parameters: EhaParameters, estimate: BulkModulusEstimate, plain: _Plain
 ) -> LoadedDiagnosis:
-    """Return a diagnosis; under a load if the flow balance holds and the force balance shows one; in stiff oil."""
+    """Return a diagnosis; under a load if the flow balance holds and the force balance shows one, else in stiff oil."""
 
     def of(tried: EhaParameters, doubt: float) -> Diagnosis:
         if doubt > 0.0:
             return diagnose_clean(log, replace(actuator_of(tried), load_doubt=doubt))
         return plain.of(log, tried)
 
-    if estimate.form == "motion":
+    if estimate.form == "flow" and estimate.gate.passed:
+        return with_rod_load(of, parameters, estimate)
+    if estimate.form in FITTED:  # no bulk modulus is known
         return with_stiffer_oil(of, parameters)
-    if estimate.form != "flow" or not estimate.gate.passed:
-        return LoadedDiagnosis(of(parameters, 0.0), parameters)
-    return with_rod_load(of, parameters, estimate)
+    return LoadedDiagnosis(of(parameters, 0.0), parameters)
 
 
 def _severities(

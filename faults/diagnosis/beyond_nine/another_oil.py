@@ -1,6 +1,7 @@
-"""Without pressure, stiff oil is no fault: conditions are compared around the oil of the fitted circuit.
+"""Where no bulk modulus is known, stiff oil is no fault: conditions are compared around the oil of the fitted circuit.
 
-With pressure, bulk modulus is measured before a circuit is fitted. Soft oil contains air, which is a fault.
+With pressure, bulk modulus is usually measured before a circuit is fitted. Without, or where the flow balance gives no
+number, the circuit alone tells the oil. Soft oil contains air, which is a fault. See decision 461.
 """
 
 import math

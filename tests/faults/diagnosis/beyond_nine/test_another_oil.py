@@ -1,4 +1,4 @@
-"""Without pressure, stiffer oil alone does not make the class unknown."""
+"""Where no bulk modulus is known, stiffer oil alone does not make the class unknown."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -89,3 +89,14 @@ def test_without_pressure_a_log_of_stiff_oil_gets_its_class_and_a_note() -> None
     assert (found.condition, found.unknown) == ("minor_leakage", False)
     (said,) = (note for note in found.notes if note.code == ClassCode.OIL_STIFFER_CLASS)
     assert said.data["ratio"] == pytest.approx(4.0, rel=0.3)
+
+
+def test_with_pressure_a_log_of_stiff_oil_that_gives_no_number_gets_its_class_and_a_note() -> None:
+    truth = replace(parameters_for(CONDITIONS["minor_leakage"]), bulk_modulus=6.0 * HEALTHY.bulk_modulus)
+    rng = np.random.default_rng(8)
+    log = simulate(CIRCUIT, make_drive("multisine", 3.0, 5e-3, truth, rng), 5e-3, truth, sensors=BENCH, rng=rng)
+    found = diagnose_log(log, Rig("paper", HEALTHY))
+    assert not found.gate.passed
+    assert (found.condition, found.unknown) == ("minor_leakage", False)
+    (said,) = (note for note in found.notes if note.code == ClassCode.OIL_STIFFER_CLASS)
+    assert said.data["ratio"] == pytest.approx(6.0, rel=0.3)
