@@ -1,9 +1,11 @@
 """Final fits of sets of hypotheses: short model steps, balanced by volume and by mass."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from estimation.finding import NORMAL_95
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
@@ -19,8 +21,10 @@ from estimation.fits.hypothesis_search.wide_log import balances_mass, usual_valu
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds, hypothesis_problem, parameters_at_end
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import STIFFNESS
+from estimation.models.wide_flow import QUICKNESS
 from estimation.models.wrong_pressure import SETTLING
 from plant.arrays import Array
+from plant.components.oil import ATMOSPHERE
 
 FINISHING = 12
 """Evaluations of the model in each round of the last search, with short model steps."""
@@ -103,6 +107,7 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     count = [one for one in done if one[0].cost <= best.cost + EQUAL_DISTANCE]
     first, *rivals = (_fit_at_end(problem, one.point, log) for one, problem in count)
     sound = best.meant and not is_too_close(first, log.passes_on)
+    sound = sound and leaves_oil({**usual_values(row), **best.values}, first.std)
     if SETTLING in last:  # an even drift is better determined if it is fitted as one
         even = tuple(replace(one, at_end=()) if one.at_end == (SETTLING,) else one for one in tried.together)
         evenly = final_fit(log, replace(tried, together=even), best.cost + REQUIRED_GAIN, *details)
@@ -111,6 +116,31 @@ def final_fit(log: GreyBoxLog, tried: Trial, useful: float = np.inf, *details: s
     if sound and all(one.told(best.values, first.std) for one in best.together):
         return replace(best, fits=(first, *(one for one in rivals if np.isfinite(one.std["bulk_modulus"]))))
     return replace(best, void=True, fits=(replace(first, cost=UNBELIEVABLE_COST),))
+
+
+def leaves_oil(values: Mapping[str, float], std: Mapping[str, float]) -> bool:
+    """Return whether the air that a fit finds leaves a liquid: air alone is never softer than oil that contains it.
+
+    Parameters
+    ----------
+    values : Mapping[str, float]
+        Parameters of the wide flow form [SI].
+    std : Mapping[str, float]
+        Their standard deviations; those without one are known [SI].
+
+    Returns
+    -------
+    bool
+        False if the bulk modulus of the liquid is surely negative (97.5 %, whatever the correlation of the two).
+    """
+    softness = values.get("air_softness", 0.0)
+    if softness <= 0.0 or values["air_onset"] >= 0.0:  # `bulk_modulus` is the liquid's if air enters later
+        return True
+    stiffness, pressure, quickness = values["bulk_modulus"], values["stated_pressure"], values[QUICKNESS]
+    bubbles = softness / pressure * (pressure / ATMOSPHERE) ** quickness  # over the oil's volume
+    share = stiffness * (1.0 - quickness) * bubbles / pressure  # of the compliance that is due to air
+    doubt = std.get("air_softness", 0.0) / softness + std.get("bulk_modulus", 0.0) / stiffness
+    return not share * (1.0 - NORMAL_95 * doubt) > 1.0
 
 
 def with_details(log: GreyBoxLog, tried: Trial) -> Trial:

@@ -11,7 +11,7 @@ from estimation.fits.greybox.descent import Point
 from estimation.fits.hypotheses import AIR, AIR_MIDWAY, CHECKS_CRACK, MAKEUP_BLOCKED, OFFSET
 from estimation.fits.hypothesis_search import final_fits
 from estimation.fits.hypothesis_search.explanation import Trial
-from estimation.fits.hypothesis_search.final_fits import EQUAL_DISTANCE, FAR_BEHIND, RIVAL_DISTANCE
+from estimation.fits.hypothesis_search.final_fits import EQUAL_DISTANCE, FAR_BEHIND, RIVAL_DISTANCE, leaves_oil
 from estimation.models.completed_flow import CRACKS
 from tests.estimation.fits.short_logs import made_fit
 
@@ -125,3 +125,38 @@ def test_a_hypothesis_whose_effect_vanished_is_dropped_from_a_pair(
     nothing: Any = None
     told = final_fits.without_vanished_effect(nothing, both)
     assert told.together == ((AIR,) if alone else (AIR, MAKEUP_BLOCKED))
+
+
+@pytest.mark.parametrize(
+    ("share", "doubt", "onset", "possible"),
+    [
+        (0.9, 0.001, -1.0, True),
+        (1.1, 0.001, -1.0, False),  # the liquid alone would have a negative bulk modulus
+        (3.4, 0.01, -1.0, False),
+        (1.1, 0.1, -1.0, True),  # by chance
+        (1.1, 0.001, 0.4, True),  # `bulk_modulus` is that of the liquid
+        (0.0, 0.0, -1.0, True),
+    ],
+)
+def test_air_that_is_surely_softer_than_the_oil_that_contains_it_is_no_explanation(
+    share: float, doubt: float, onset: float, possible: bool
+) -> None:
+    stiffness, pressure = 4e8, 1e6
+    values = {
+        "bulk_modulus": stiffness,
+        "air_softness": share * pressure**2 / stiffness,
+        "air_onset": onset,
+        "air_quickness": 0.0,
+        "stated_pressure": pressure,
+    }
+    std = {"bulk_modulus": 0.5 * doubt * stiffness, "air_softness": 0.5 * doubt * values["air_softness"]}
+    assert leaves_oil(values, std) is possible
+
+
+def test_air_that_is_compressed_quickly_is_stiffer_and_leaves_more_liquid() -> None:
+    values = {"bulk_modulus": 4e8, "air_softness": 2750.0, "air_onset": -1.0, "stated_pressure": 101325.0 * 2.0}
+    share = 4e8 * 2750.0 / (101325.0 * 2.0) ** 2
+    assert not leaves_oil({**values, "air_quickness": 0.0}, {})
+    scale = 1.05 / share  # isothermal air of 105 % of the compliance; 96 % with an exponent of 1.25
+    assert not leaves_oil({**values, "air_softness": 2750.0 * scale, "air_quickness": 0.0}, {})
+    assert leaves_oil({**values, "air_softness": 2750.0 * scale, "air_quickness": 0.2}, {})
