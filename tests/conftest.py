@@ -74,7 +74,7 @@ def pytest_collection() -> Generator[None, object, object]:
     collected = yield
     gc.collect()
     gc.freeze()
-    gc.set_threshold(20_000, 20, 20)  # objects; collecting every 700 takes a tenth of the time
+    gc.set_threshold(50_000, 20, 100)  # objects; collecting every 700 takes a tenth of the time
     gc.enable()
     return collected
 

@@ -125,7 +125,7 @@ def test_a_velocity_from_a_late_encoder_is_corrected_with_it_and_a_separate_one_
 
 
 def test_a_drifting_pressure_offset_is_identified_and_subtracted() -> None:
-    record = log()
+    record = log(duration=1.0)
     drifting = record.replace(**{PRESSURE: record[PRESSURE] + np.linspace(0.0, -1e5, len(record))})
     found = explained(drifting)
     assert found.names == ("pressure_drift",)

@@ -275,7 +275,7 @@ def test_a_backlash_is_reported_with_the_interval_of_its_half_width(tmp_path: Pa
 
 
 def test_an_error_model_is_reported_saved_and_simulated(tmp_path: Path) -> None:
-    u, y = signals(3)
+    u, y = (column[:500] for column in signals(3))
     table = pd.DataFrame({"u": u[:, 0], "y": y}, index=0.01 * np.arange(y.size))
     table.to_csv(tmp_path / "product.csv", index_label="time_s")
     saved, columns = tmp_path / "model.json", ("--input", "u", "--output", "y")

@@ -84,7 +84,9 @@ def test_a_wandering_pressure_sensor_is_objected_to(monkeypatch: pytest.MonkeyPa
     assert gas not in fit.remarks
 
 
-@pytest.mark.parametrize("offset", [0.0, 2e5], ids=["at rest", "under load"])
+@pytest.mark.parametrize(
+    "offset", [pytest.param(0.0, id="at rest", marks=pytest.mark.slow), pytest.param(2e5, id="under load")]
+)
 def test_a_log_whose_search_exceeds_its_work_limit_is_refused_without_trying_a_filter(
     offset: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -42,7 +42,7 @@ def estimated(record: Record) -> BulkModulusEstimate:
         ("prbs", over_last, 3, 1e-3),
         ("prbs", over_last, 8, 1e-3),
         ("steps", over_both_sides, 5, 1e-3),
-        ("multisine", over_both_sides, 10, 1e-3),
+        pytest.param("multisine", over_both_sides, 10, 1e-3, marks=pytest.mark.slow),
         ("prbs", over_last, 5, 1e-4),
     ],
 )

@@ -54,7 +54,7 @@ SPEED = 175.0
 
 def test_implicit_steps_explain_a_log_whose_usual_steps_chatter(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the usual steps such logs were refused: the residuals were the model's own error."""
-    speed = chirp(1.5, 5e-4, SPEED, 0.5, 4.0)
+    speed = chirp(1.0, 5e-4, SPEED, 0.5, 4.0)
     sensors, rng = replace(BENCH, pressure_noise=1500.0), np.random.default_rng(1)
     rod = EhaParameters(**{name: getattr(PILOTED, name) for name in PARAMETER_NAMES})
     # the rod is held until the log begins: a creep would need a start under pressure besides

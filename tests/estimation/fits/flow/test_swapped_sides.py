@@ -21,7 +21,7 @@ CHANNELS = ("motor_speed_rad_s", "position_m", "differential_pressure_pa")
 
 def log_of(rig: CircuitParameters) -> Record:
     true, rng = parameters_for(CONDITIONS["minor_leakage"], rig), np.random.default_rng(463)
-    speed = nine_steps(2.7, 1e-3, rig, rng)
+    speed = nine_steps(1.4, 1e-3, rig, rng)
     record = simulate(CIRCUIT, speed, 1e-3, true, sensors=BENCH, rng=rng)
     return Record(1e-3, {name: record[name] for name in CHANNELS})
 

@@ -152,9 +152,9 @@ def test_the_prior_of_the_initial_pressure_level_reaches_up_to_half_of_the_peak_
 def test_bulk_modulus_is_right_in_a_log_that_begins_with_both_chambers_shut_in() -> None:
     """Their pressures had met in a pause after a hard move. Too low a start cost 0.05 % and five times the search."""
     rng, p = np.random.default_rng(0), parameters_for(CONDITIONS["major_friction"])
-    speed = np.repeat([120.0, 0.0, 0.0, 0.0, -110.0, 90.0, 0.0, -90.0, 80.0, -120.0, 0.0], 800)
+    speed = np.repeat([120.0, 0.0, 0.0, 0.0, -110.0, 90.0, 0.0, -90.0, 80.0, -120.0, 0.0], 400)
     whole = simulate(CIRCUIT, speed, 1e-3, p, sensors=BENCH, rng=rng)
-    found = estimate_bulk_modulus(whole.slice(3000, len(whole)), RIG)
+    found = estimate_bulk_modulus(whole.slice(1500, len(whole)), RIG)
     assert found.gate.passed
     assert found.value == pytest.approx(p.bulk_modulus, rel=3e-4)
 

@@ -38,7 +38,7 @@ def each_fifth(_: np.random.Generator, n: int) -> BoolArray:
         pytest.param(0.98, 1000, 1, every, id="very slow"),
         pytest.param(0.95, 1000, 1, one_in_two, id="half of the samples missing"),
         pytest.param(0.98, 5000, 1, each_fifth, id="a sensor of one row in five"),
-        pytest.param(0.9, 150, 10, every, id="ten short logs"),
+        pytest.param(0.9, 150, 4, every, id="four short logs"),
         pytest.param(-0.6, 500, 1, every, id="fast"),
     ],
 )

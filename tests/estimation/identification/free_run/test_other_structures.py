@@ -38,7 +38,7 @@ def test_arx_does_not_differ_from_output_error_behind_noise_as_it_assumes() -> N
 
 @pytest.mark.parametrize("structure", ["instrumental", "continuous", "subspace"])
 def test_the_gain_of_a_plant_that_integrates_means_nothing_in_any_structure(structure: str) -> None:
-    u = steps(1500, 3, hold=10)
+    u = steps(600, 3, hold=10)
     y = filtered([0.0, 0.01, 0.005], np.polymul([1.0, -1.0], [1.0, -0.7]), u)
     y = y + y.std() / 30.0 * np.random.default_rng(3).normal(size=u.size)
     data = channels_from([u[:, None]], [y], 0.01, ["u"], "y")

@@ -31,7 +31,7 @@ def told(found: Identified) -> bool:
     return IdentificationCode.TREND in [note.code for note in found.notes]
 
 
-@pytest.mark.parametrize("logs", [1, 2])
+@pytest.mark.parametrize("logs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_trend_is_noted_and_does_not_bias_the_gain(logs: int) -> None:
     found = identify_channels(channels(0, 0.9, SLOPE, logs), order=2, delay=1)
     (note,) = (one for one in found.notes if one.code == IdentificationCode.TREND)
