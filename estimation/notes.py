@@ -104,7 +104,7 @@ class EstimateCode(Code):
         "the true uncertainty is larger than the covariance"
     )
     BOUND_TOO_WIDE = (
-        "this log determines bulk modulus to {percent:.0f} % at best (Cramér-Rao bound; 3 % is allowed): log larger "
+        "this log determines bulk modulus to {percent:.1f} % at best (Cramér-Rao bound; 3 % is allowed): log larger "
         "steps, at 1 kHz or more"
     )
     KNOWN_AS_THE_RIG = (
