@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from estimation.identification.notes import GAIN_MEANS_NOTHING, IdentificationCode
-from experiments.identification.of_channels import INPUT, OUTPUT
+from estimation.log_checks.channel_names import SPEED, VELOCITY
 from experiments.log_pages.identified_charts import MeasuredCurve
 from experiments.log_pages.identified_view import AS_LOGGED, IdentifiedView, Signal
 from experiments.page.numbers import number
@@ -215,7 +215,7 @@ def uses_of(view: IdentifiedView, measured: MeasuredCurve | None) -> tuple[list[
     if usable and has_limits(view):
         bad.append("Controller design without a check: the measured response holds samples at the limits.")
     bad += [*_gain_warnings(view), *_residual_warnings(view)]
-    if (view.result["input"], view.result["output"]) == (INPUT, OUTPUT):
+    if (view.result["input"], view.result["output"]) == (SPEED, VELOCITY):
         bad.append("Diagnosis: the model does not tell leakage, friction and oil apart. Use hydrostate diagnose.")
     return good, bad
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from plant.eha.model import EhaParameters
+
 PRESSURE_GAIN = "pressure_gain"
 """Name of the gain of the differential pressure: it has only an uncertainty, its value is 1."""
 
@@ -143,7 +145,5 @@ def default_uncertainties(parameters: Any) -> Mapping[str, DefaultUncertainty]:
     parameters : dataclass or its type
         The actuator's parameters [SI].
     """
-    from plant.eha.model import EhaParameters
-
     kind = parameters if isinstance(parameters, type) else type(parameters)
     return DEFAULT_UNCERTAINTIES if issubclass(kind, EhaParameters) else MappingProxyType({})

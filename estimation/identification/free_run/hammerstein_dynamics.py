@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from estimation.arrays import Array
+from estimation.finding import interval_95
 from estimation.identification.free_run.data import Scaling
 from estimation.identification.free_run.dynamics import OutputErrorDynamics
 from estimation.identification.free_run.fallback import Fallback
@@ -85,8 +86,6 @@ class HammersteinDynamics(OutputErrorDynamics):
 
     def nonlinearity(self, by: Scaling) -> dict[str, Any]:
         """Return kind and values in the input's unit, each with its standard deviation and 95 % interval."""
-        from estimation.finding import interval_95
-
         kind, size = NONLINEARITIES[self.at_input], float(by.u_std[0])
         found: dict[str, Any] = {"kind": self.at_input}
         for name, value, std in zip(kind.names, self.values, self.std, strict=True):

@@ -1,5 +1,7 @@
 """A linear fit of one input as a `LinearModel`: units of the channels, both covariances, offset and initial state."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from estimation.arrays import Array
@@ -87,8 +89,6 @@ def _residual_and_spread(fit: LinearFit, problem: Problem) -> tuple[Array, Array
 
 
 def _with_initial_state(model: LinearModel, simulated: Array, u: Array, by: Scaling) -> LinearModel:
-    from dataclasses import replace
-
     inputs = by.u_mean[0] + by.u_std[0] * u
     return replace(model, initial_state=estimate_initial_state(model, inputs, simulated))
 

@@ -1,6 +1,7 @@
 """Excel workbooks: every sheet with rows of numbers is a table with the layout of a text log."""
 
 import re
+import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -49,8 +50,6 @@ def open_xlsx(path: Path) -> tuple[Table, ...]:
     """
     openpyxl = library("openpyxl", "Excel", str(path))
     uncomputed = _check_workbook(path)
-    import warnings
-
     made: list[Table] = []
     units: dict[str, str] = {}
     with warnings.catch_warnings(), path.open("rb") as file:  # of a path, openpyxl would judge the suffix
