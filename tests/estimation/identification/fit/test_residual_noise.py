@@ -77,13 +77,23 @@ def test_density_adds_up_to_the_variance_of_a_narrow_line() -> None:
         assert np.fft.irfft(found.on_grid(size), size)[0] == pytest.approx(float(residual @ residual) / t.size)
 
 
-def test_empty_experiments_and_few_samples_are_taken() -> None:
-    rng = np.random.default_rng(2)
-    used = np.ones(40, dtype=np.bool_)
+def test_lags_of_a_handful_of_pairs_do_not_count() -> None:
+    rows, rng = np.arange(2000), np.random.default_rng(0)
+    noise, none = rng.standard_normal(rows.size), np.zeros((rows.size, 0))
+    beside = each_fifth(rng, rows.size) | np.isin(rows, (501, 902, 1203))  # six pairs at most lags that are no fifth
+    found = noise_spectrum([(np.where(beside, noise, 0.0), none, beside)])
+    np.testing.assert_array_equal(found.coefficients, [1.0])
+    np.testing.assert_array_equal(found.whitened[1:5], 0.0)
+
+
+def test_an_experiment_without_samples_changes_nothing() -> None:
+    rng, used = np.random.default_rng(2), np.ones(40, dtype=np.bool_)
     used[20:30] = False
     columns = np.where(used[:, None], rng.standard_normal((40, 2)), 0.0)
     residual = np.where(used, rng.standard_normal(40), 0.0)
-    data = Experiments(residual, residual, used, np.array([0, 20, 30, 31, 40]))
-    white, robust, _ = covariances(columns, residual, data)
-    assert np.linalg.eigvalsh(robust).min() > 0.0
-    assert np.diag(robust) == pytest.approx(np.diag(white), rel=2.0)
+    with_empty = Experiments(residual, residual, used, np.array([0, 20, 30, 31, 40]))
+    without = Experiments(residual[used], residual[used], used[used], np.array([0, 20, 21, 30]))
+    found, wanted = covariances(columns, residual, with_empty), covariances(columns[used], residual[used], without)
+    for one, other in zip(found[:2], wanted[:2], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    assert np.linalg.eigvalsh(found[1]).min() > 0.0

@@ -66,9 +66,35 @@ def test_an_error_model_leaves_a_third_of_the_error_on_another_record() -> None:
     assert found.error < 0.5 * found.plain_error
 
 
+def test_what_a_model_leaves_on_average_is_not_penalised() -> None:
+    u, y = signals(0)
+    found = error_model(y=y + 0.7)
+    assert found is not None
+    assert found.values[0] == pytest.approx(np.mean(y + 0.7 - linear_run(u)), rel=1e-12)
+
+
+@pytest.mark.parametrize(("outputs", "fitted"), [(11, False), (12, True)])
+def test_an_error_model_takes_two_outputs_for_each_coefficient(outputs: int, fitted: bool) -> None:
+    u = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, 1))
+    y, run = np.full(SAMPLES, np.nan), linear_run(u)
+    at = np.linspace(0, SAMPLES - 1, outputs).astype(int)
+    y[at] = run[at] + u[at, 0] ** 2  # six coefficients: a constant, two signals, three products
+    found = error_model_of([run], Channels(("u",), "y", 0.01, (u,), (y,)), [0])
+    assert (found is not None) == fitted
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_what_is_noise_alone_has_no_error_model(seed: int) -> None:
     assert error_model(seed, product=0.0) is None
+
+
+@pytest.mark.parametrize(("quarters", "corrected"), [(3, False), (4, True)])
+def test_an_error_that_one_of_four_blocks_does_not_have_is_left_to_chance(quarters: int, corrected: bool) -> None:
+    rng, driven = np.random.default_rng(0), np.arange(SAMPLES) < quarters * SAMPLES // 4
+    u = np.where(driven, rng.uniform(-1.0, 1.0, SAMPLES), 0.0)[:, None]
+    run, noise = linear_run(u), 0.3 * rng.standard_normal(SAMPLES)
+    y = run + np.where(driven, u[:, 0] ** 2 - 1.0 / 3.0, noise)
+    assert (error_model_of([run], Channels(("u",), "y", 0.01, (u,), (y,)), [0]) is not None) == corrected
 
 
 def test_missing_and_undetermined_outputs_do_not_count() -> None:

@@ -67,7 +67,7 @@ def test_deviations_from_one_log_equal_the_cramer_rao_bound_and_errors_are_consi
     data = draw_log(0, 500)
     (values, deviations), limit = model_values(identified_model(data, 3)), model_values(with_covariance_bound(data))[1]
     free = limit > 1e-9
-    assert deviations[free] == pytest.approx(limit[free], rel=0.5)
+    assert deviations[free] == pytest.approx(limit[free], rel=0.1)
     assert np.mean(deviations[free] / limit[free]) == pytest.approx(1.0, abs=0.1)
     assert np.sqrt(np.mean(((values - model_values(plant())[0])[free] / limit[free]) ** 2)) < 2.0
 

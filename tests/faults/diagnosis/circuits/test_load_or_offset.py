@@ -58,7 +58,7 @@ def test_a_spring_is_distinguished_from_a_constant_load() -> None:
     spring = load_for_offset(sprung, ACTUATOR, "normal", without, -3.0, 14.0)
     assert spring is not None
     assert (spring.code, spring.data["entry"]) == (AgainstCode.LOAD_UNTOLD, "load_stiffness")
-    assert float(spring.data["value"]) == pytest.approx(2e4, rel=0.5)
+    assert float(spring.data["value"]) == pytest.approx(2e4, rel=0.3)
 
 
 def test_neither_load_nor_offset_is_named_if_no_circuit_follows_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
