@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from plant.eha.circuit_parameters import CircuitParameters
-from plant.eha.one_sided import ONE_SIDED, OneSidedParameters, circuit_plant, padded_row, with_make_up_faults
+from plant.eha.one_sided import (
+    ONE_SIDED,
+    OneSidedParameters,
+    circuit_plant,
+    one_sided_derivative,
+    padded_row,
+    with_make_up_faults,
+)
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.errors import RigError
 from plant.log.record import Record
@@ -52,6 +59,18 @@ def test_a_leaking_seat_slows_the_piston_while_its_chamber_pushes(side: str, sig
     ]
     assert lost[0] > 0.1
     assert lost[0] > 2.0 * abs(lost[1])
+
+
+@pytest.mark.parametrize("name", ["makeup_shut_a", "makeup_shut_b", "seat_leakage_a", "seat_leakage_b"])
+def test_the_oil_that_a_faulty_valve_passes_leaves_the_inner_circuit(name: str) -> None:
+    size = 1.0 if name.startswith("makeup") else 1e-10
+    state = (0.0, 0.0, 0.0, 0.0, 2.1605e-3, 2.161e-3, PAPER.accumulator_oil)  # both chambers are below it
+    sound, faulty = (
+        np.array(one_sided_derivative(state, 0.0, with_make_up_faults(PAPER, **fault))) for fault in ({}, {name: size})
+    )
+    more = faulty - sound
+    assert np.flatnonzero(more).tolist() == [4 + "ab".index(name[-1]), 6]
+    assert (more.max() > 0.0, more.sum()) == (True, pytest.approx(0.0, abs=1e-9 * more.max()))
 
 
 def test_the_length_of_a_row_selects_the_circuit_and_a_widened_row_has_no_faults() -> None:

@@ -26,7 +26,13 @@ def test_a_scaled_actuator_loses_the_same_share_of_velocity_and_adds_the_same_sh
         friction_coulomb=area * PAPER_RIG.friction_coulomb,
     )
     assert leakage_scales(p) == pytest.approx({"leakage_coefficient": flow, "flow_bias": flow}, rel=1e-6)
-    assert friction_scales(p)["friction_linear"] == pytest.approx(area * area / flow, rel=1e-6)
+    slower = area / flow  # the velocity that the pump's rated flow gives, in the paper over here
+    expected = {
+        "friction_quadratic": area * slower**2,
+        "friction_linear": area * slower,
+        "friction_coulomb": area,
+    }
+    assert friction_scales(p) == pytest.approx(expected, rel=1e-6)
     (_, own), (_, paper) = (steady_state(one.rated_speed, one) for one in (p, PAPER_RIG))
     assert own == pytest.approx(paper, rel=1e-6)
 

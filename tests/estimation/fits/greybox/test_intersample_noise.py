@@ -66,7 +66,7 @@ def test_an_offset_of_motor_speed_is_not_taken_for_turns() -> None:
     course = IntersampleDoubt(np.where(np.arange(samples) % 20 == 10, 4e5, 0.0))
     velocity = (HEALTHY.pump_displacement * 50.0 - HEALTHY.flow_bias) / HEALTHY.piston_area
     log.drives[:] = np.column_stack([np.full(samples, 50.0), velocity * log.sample_time * np.arange(samples)])
-    (more,) = FreedProblem(form, log, (), {}).disturbed(np.empty(0), [log.drives + [0.3, 0.0]])
+    (more,) = FreedProblem(form, log, (), {}).disturbed(np.empty(0), [np.add(log.drives, (0.3, 0.0))])
     log.measured[:, 0] = 5e3 * (more.ravel() + rng.standard_normal(samples))
     assert np.ptp(more) > 4.0
     assert likeliest_noise(FreedProblem(form, log, (), {}), np.empty(0), course)[0] == 0.0
