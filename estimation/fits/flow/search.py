@@ -15,7 +15,7 @@ from estimation.fits.flow.wide_valves import opens_wide
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.drive_noise import effect_of_drive_noise
-from estimation.fits.greybox.fit import GreyBoxFit, explains_log, fit_at_solution
+from estimation.fits.greybox.fit import Asked, GreyBoxFit, explains_log, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
@@ -212,10 +212,8 @@ def _reported_fits(done: Sequence[Found], log: GreyBoxLog, steps: IntArray) -> S
 
     def told(one: Found) -> GreyBoxFit:
         problem, point, bounds = one
-        counts, asked = one in counting, one is best or one is swinging
-        return fit_at_solution(
-            problem, point, least=bounds[0], disturbed=counts, asked=asked, steps=steps, moved_by_noise=shaken
-        )
+        asked = Asked(disturbed=one in counting, beside=one is best or one is swinging)
+        return fit_at_solution(problem, point, least=bounds[0], asked=asked, steps=steps, moved_by_noise=shaken)
 
     return map_cases(told, done)
 

@@ -6,13 +6,14 @@ the rig's own parameters. The last two follow from the fit's linear response to 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 
 from estimation.arrays import IntArray
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.deviations import covariance_of, information, prior_precision
+from estimation.fits.greybox.deviations import Information, covariance_of, information, prior_precision
 from estimation.fits.greybox.lateness import Delays, late_and_play, residuals_and_changes
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.noise_shift import noise_shift
@@ -204,7 +205,7 @@ def coarse_optimum(
 
     if len(guesses) > 1:
         screened = map_cases(lambda guess: descended(guess, search.screened, search.screening), guesses)
-        likely = sorted(screened, key=_cost)[: search.finalists]
+        likely = sorted(screened, key=attrgetter("cost"))[: search.finalists]
         if hopeful and not explains_log(problem.on(log.beginning(search.screened)), likely[0]):
             return replace(likely[0], cost=np.inf)
         guesses = [point.theta for point in likely]
@@ -216,29 +217,35 @@ def coarse_optimum(
         points.append(descended(guess, len(log.measured), search.evaluations))
         if explains_log(whole, points[-1]):
             break
-    return min(points, key=_cost)
+    return min(points, key=attrgetter("cost"))
 
 
 def explains_log(problem: Problem, point: Point) -> bool:
-    """Return whether a point of the search explains a log so well that no better one is needed.
-
-    Parameters
-    ----------
-    problem : Problem
-        Model and log.
-    point : Point
-        A point of its search.
-
-    Returns
-    -------
-    bool
-        Whether no other finalist need be tried.
-    """
+    """Return whether a point of the search explains a log so well that no other finalist need be tried."""
     return 2.0 * point.cost < largest_chi_square(problem.blocks) * problem.blocks
 
 
-def _cost(point: Point) -> float:
-    return point.cost
+@dataclass(frozen=True)
+class Asked:
+    """What a fit is asked beside its unknowns.
+
+    Parameters
+    ----------
+    disturbed : bool
+        Whether the deviations include drive noise.
+    beside : bool
+        Whether such a fit also includes the response to the rig's uncertainties and the timing of drives.
+    warned : bool
+        Whether to warn if unknowns are not separately determined; otherwise their deviations are infinite.
+    """
+
+    disturbed: bool = True
+    beside: bool = True
+    warned: bool = True
+
+
+ASKED = Asked()
+"""Everything."""
 
 
 def fit_at_solution(
@@ -246,9 +253,7 @@ def fit_at_solution(
     point: Point,
     *,
     least: Array | None = None,
-    disturbed: bool = True,
-    asked: bool = True,
-    warned: bool = True,
+    asked: Asked = ASKED,
     steps: IntArray | None = None,
     moved_by_noise: Array | None = None,
 ) -> GreyBoxFit:
@@ -262,12 +267,8 @@ def fit_at_solution(
         Its solution.
     least : ndarray, shape (unknowns,), optional
         Lowest coordinates of its search, see `estimation.fits.greybox.sign_constraints` [dimensionless].
-    disturbed : bool
-        Whether the deviations include drive noise.
-    asked : bool
-        Whether such a fit also includes the response to the rig's uncertainties and the timing of drives.
-    warned : bool
-        Whether to warn if unknowns are not separately determined; otherwise their deviations are infinite.
+    asked : Asked
+        What is told beside the unknowns.
     steps : ndarray of int, shape (n,), optional
         See `GreyBoxFit`; responses to the rig's uncertainties are as exact with them.
     moved_by_noise : ndarray, shape (outputs * blocks, draws), optional
@@ -279,22 +280,15 @@ def fit_at_solution(
     felt = np.flatnonzero(effects > np.where(prior_precision(problem) > 0.0, 0.0, LEAST_EFFECT**2))
     whole, rig, late = np.diag(np.full(len(theta), np.inf)), dict[str, Array](), dict[str, tuple[float, float, float]]()
     play, teeth, offset, by_noise = NO_PLAY, dict[int, ShownRipple](), NO_OFFSET, NO_SHIFTS
-    used, names = int(np.count_nonzero(errors)), [model.unknowns[place] for place in felt]
-    if len(felt) and used > len(theta):
-        known_of = information(problem, theta, errors, all_slopes, felt, warned=warned)
-        left_over, slopes, bread = known_of.left_over, known_of.fitted_slopes, known_of.fitted_bread
-        told = disturbed and asked
+    if len(felt) and np.count_nonzero(errors) > len(theta):
+        known_of = information(problem, theta, errors, all_slopes, felt, warned=asked.warned)
+        told = asked.disturbed and asked.beside
         here, moved = residuals_and_changes(problem, theta, errors) if told else (None, [])
         covariance = covariance_of(
-            problem, point, known_of, least=least, disturbed=disturbed, undisturbed=here, moved=moved_by_noise
+            problem, point, known_of, least=least, disturbed=asked.disturbed, undisturbed=here, moved=moved_by_noise
         )
-        held, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
-        counts = problem.log.counts if asked else held
-        if (disturbed and counts) or shifted:
-            teeth, offset = shown_ripple(problem, theta, left_over, bread, slopes, counts)
-            opened = sum(teeth[count].opened for count in held if count in teeth)
-            covariance = covariance + np.diag(opened + (offset.opened if shifted and not held else np.zeros(len(felt))))
-        whole[np.ix_(felt, felt)] = covariance
+        teeth, offset, opened = _ripple_and_offset(problem, theta, known_of, asked)
+        whole[np.ix_(felt, felt)] = covariance + np.diag(opened)
         if told:
             by_noise = noise_shift(problem, theta, known_of)
             rig = dict(responses_to_rig(with_steps(problem, steps), theta, known_of))
@@ -318,7 +312,7 @@ def fit_at_solution(
         slopes=all_slopes,
         teeth=teeth,
         speed_offset=offset,
-        small_teeth=small_pump_ripple(asked_of_teeth, names),
+        small_teeth=small_pump_ripple(asked_of_teeth, [model.unknowns[place] for place in felt]),
         noise_shift=by_noise,
         covariance=whole,
         cost=point.cost,
@@ -327,6 +321,20 @@ def fit_at_solution(
         seen=seen,
         steps=steps,
     )
+
+
+def _ripple_and_offset(
+    problem: Problem, theta: Array, known_of: Information, asked: Asked
+) -> tuple[Mapping[int, ShownRipple], ShownOffset, Array]:
+    """Return what residuals show of ripple and of an offset of speed, and the variance that correcting either adds."""
+    corrected, shifted = [one.count for one in problem.log.teeth], problem.log.speed_offset != 0.0
+    counts, opened = problem.log.counts if asked.beside else corrected, np.zeros(len(known_of.felt))
+    if not ((asked.disturbed and counts) or shifted):
+        return {}, NO_OFFSET, opened
+    known = known_of.left_over, known_of.fitted_bread, known_of.fitted_slopes
+    teeth, offset = shown_ripple(problem, theta, *known, counts)
+    opened = sum((teeth[count].opened for count in corrected if count in teeth), opened)
+    return teeth, offset, opened + offset.opened if shifted and not corrected else opened
 
 
 def _statistics(errors: Array) -> tuple[tuple[float, ...], tuple[float, ...], float]:

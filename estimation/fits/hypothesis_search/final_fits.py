@@ -7,7 +7,7 @@ import numpy as np
 
 from estimation.finding import NORMAL_95
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
+from estimation.fits.greybox.fit import Asked, GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.play import omitted_play_note
@@ -246,7 +246,7 @@ def _is_absent(one: Hypothesis, tried: Trial, deviations: float) -> bool:
 
 def _fit_at_end(problem: FreedProblem, point: Point, log: GreyBoxLog) -> GreyBoxFit:
     least, _ = flow_bounds(problem.model, [point.theta], log)
-    return fit_at_solution(problem, point, least=least, warned=False)
+    return fit_at_solution(problem, point, least=least, asked=Asked(warned=False))
 
 
 def _completed_search(problem: FreedProblem, tried: Trial, start: Array, *more: str, useful: float = np.inf) -> Trial:

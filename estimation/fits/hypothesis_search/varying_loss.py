@@ -14,7 +14,7 @@ import numpy as np
 from estimation.finding import NORMAL_95
 from estimation.fits.flow.accumulator import first_stiffness
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
+from estimation.fits.greybox.fit import Asked, GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.spared_steps import LAST_EVALUATIONS, with_steps_where_needed
@@ -273,7 +273,7 @@ class _Search:
         quick = with_steps_where_needed(problem, point.theta)
         near = descend(quick.at, point.theta, FINISHING, bounds)
         ended = near if quick is problem else descend(problem.at, near.theta, LAST_EVALUATIONS, bounds)
-        fit = fit_at_solution(problem, ended, least=bounds[0], warned=False)
+        fit = fit_at_solution(problem, ended, least=bounds[0], asked=Asked(warned=False))
         opened = 0.0
         if answers := self._responses(problem, ended.theta, course):
             by = np.linalg.lstsq(fit.slopes, np.column_stack(answers), rcond=None)[0]

@@ -11,7 +11,7 @@ from estimation.fits.flow.log import _swept_share, leakage_guess, speed_gaps, wi
 from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.greybox.chance import largest_chi_square
 from estimation.fits.greybox.descent import Point, descend
-from estimation.fits.greybox.fit import GreyBoxFit, Search, explains_log, fit_at_solution, fit_greybox
+from estimation.fits.greybox.fit import Asked, GreyBoxFit, Search, explains_log, fit_at_solution, fit_greybox
 from estimation.fits.greybox.log import OutputNoise
 from estimation.fits.greybox.problem import Problem, search_bounds
 from estimation.fits.greybox.problem import quadratic as sums_of
@@ -202,7 +202,7 @@ def grey_box_fits() -> dict[str, Any]:
     }
     one = problem()
     theta = descend(one.at, usual(one), 25, flow_bounds(one.model, [usual(one)], one.log)).theta
-    plain = fit_at_solution(one, one.at(theta), disturbed=False)
+    plain = fit_at_solution(one, one.at(theta), asked=Asked(disturbed=False))
     told["not disturbed"] = told_of(plain)
     noisy = one.on(
         replace(

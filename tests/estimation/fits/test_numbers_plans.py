@@ -18,6 +18,7 @@ from estimation.fits.flow import search as flow_search
 from estimation.fits.flow.search import flow_starts
 from estimation.fits.greybox import fit as greybox_fit
 from estimation.fits.greybox.descent import Point
+from estimation.fits.greybox.fit import ASKED, Asked
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.parallel_descents import Way
 from estimation.fits.greybox.spared_steps import LAST_EVALUATIONS
@@ -153,7 +154,7 @@ def plan_of_explanations() -> dict[str, Any]:
     def promised(_: Any, __: Any, ___: Any, given: Sequence[Any], **_more: object) -> list[Any]:
         return promises[: len(given)]
 
-    def concluded(_: Any, point: Point, **_told: bool) -> Any:
+    def concluded(_: Any, point: Point, **_told: object) -> Any:
         fit = made_fit(point.cost, 2e8, 1e6)
         return replace(fit, std={**fit.std, "relief_pressure": 1e3})
 
@@ -182,8 +183,8 @@ def plan_of_explanations() -> dict[str, Any]:
 def plan_of_the_flow_form() -> dict[str, Any]:
     told: dict[str, Any] = {}
 
-    def concluded(_: Any, point: Point, disturbed: bool = True, **_asked: bool) -> Any:
-        return [point.cost, disturbed]
+    def concluded(_: Any, point: Point, asked: Asked = ASKED, **_beside: Any) -> Any:
+        return [point.cost, asked.disturbed]
 
     for name, one in {"plain": seen(log(0.5)), "noisy position": seen(log(0.5, position_noise=3e-5))}.items():
         for kind, cost in (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.flow.log import MOST_LEAD
-from estimation.fits.greybox.fit import LEAST_EFFECT, GreyBoxFit, fit_at_solution
+from estimation.fits.greybox.fit import LEAST_EFFECT, Asked, GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.models.flow import FLOW_FORM
 from tests.estimation.fits.short_logs import PAPER, WORN, log, seen
@@ -27,7 +27,7 @@ def fitted(lead_std: float, late: int = 0) -> GreyBoxFit:
     problem = FreedProblem.of(FLOW_FORM, sparse)
     values = {"makeup_conductance": 1e-9, "makeup_opening": 1e3, "case_leakage": 1e-13, "speed_lead": 1e-5}
     values |= {name: getattr(WORN, name) for name in (BULK_MODULUS, "leakage_coefficient", "flow_bias")}
-    return fit_at_solution(problem, problem.at(problem.model.theta(values)), disturbed=late > 0)
+    return fit_at_solution(problem, problem.at(problem.model.theta(values)), asked=Asked(disturbed=late > 0))
 
 
 def test_a_motor_lead_with_little_effect_per_unit_widens_the_deviation_of_bulk_modulus() -> None:
@@ -63,6 +63,6 @@ def test_a_limited_prior_of_a_barely_felt_make_up_valve_narrows_the_deviation_of
     deviations: list[float] = []
     for within in (sparse.within, {"makeup_conductance": 30.0}):
         problem = FreedProblem.of(FLOW_FORM, replace(sparse, within=within))
-        fit = fit_at_solution(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        fit = fit_at_solution(problem, problem.at(problem.model.theta(values)), asked=Asked(disturbed=False))
         deviations.append(fit.std["leakage_coefficient"])
     assert 2.0 * deviations[0] < deviations[1]

@@ -13,7 +13,7 @@ from estimation.fits.flow.other_minimum import Found
 from estimation.fits.flow.search import balance_fits, flow_starts
 from estimation.fits.flow.wide_valves import outruns_pump
 from estimation.fits.greybox.descent import Point
-from estimation.fits.greybox.fit import GreyBoxFit, coarse_optimum, fit_at_solution
+from estimation.fits.greybox.fit import Asked, GreyBoxFit, coarse_optimum, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.greybox.problem import Problem
@@ -173,8 +173,8 @@ def test_reported_fits_use_short_steps_even_if_less_drain_was_found_with_long_on
         long = problem.on(problem.log.coarsened())
         return [one, (long, replace(point, cost=point.cost - 1.0), bounds)]
 
-    def recording(problem: Problem, point: Point, *, asked: bool, **given: Any) -> GreyBoxFit:
-        told.extend([int(problem.log.steps.sum())] * asked)
+    def recording(problem: Problem, point: Point, *, asked: Asked, **given: Any) -> GreyBoxFit:
+        told.extend([int(problem.log.steps.sum())] * asked.beside)
         return fit_at_solution(problem, point, asked=asked, **given)
 
     for name, stand_in in (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.fits.greybox.chance import correlation_by_chance, largest_chi_square
-from estimation.fits.greybox.fit import explains_log, fit_at_solution
+from estimation.fits.greybox.fit import Asked, explains_log, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
 from estimation.fits.hypothesis_search.fit_objections import fit_explains, fit_explains_all
 from estimation.log_checks.measurement_noise import measurement_variances
@@ -61,5 +61,5 @@ def test_a_fit_counts_only_the_residuals_of_logged_samples() -> None:
     pressure = record[PRESSURE].copy()
     pressure[::4] = np.nan
     one = FreedProblem.of(FLOW_FORM, seen(record.replace(**{PRESSURE: pressure})))
-    fit = fit_at_solution(one, one.at(usual(one)), disturbed=False)
+    fit = fit_at_solution(one, one.at(usual(one)), asked=Asked(disturbed=False))
     assert fit.seen == np.count_nonzero(np.isfinite(pressure))

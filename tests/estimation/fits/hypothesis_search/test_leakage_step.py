@@ -9,7 +9,7 @@ import pytest
 from estimation.eha.explanation_notes import notes_of
 from estimation.fits.flow.fit import fit_flow
 from estimation.fits.flow.log import flow_log, without_strays
-from estimation.fits.greybox.fit import fit_at_solution
+from estimation.fits.greybox.fit import Asked, fit_at_solution
 from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypotheses import LEAKAGE_STEP
 from estimation.fits.hypothesis_search.lost_flow import likeliest_step
@@ -101,7 +101,7 @@ def test_cracking_pressures_widen_the_interval_of_bulk_modulus_beside_a_leakage_
     stds: list[float] = []
     for one in (LEAKAGE_STEP, replace(LEAKAGE_STEP, beside=())):
         problem = hypothesis_problem(log, (one,))
-        fit = fit_at_solution(problem, problem.at(problem.model.theta(values)), disturbed=False)
+        fit = fit_at_solution(problem, problem.at(problem.model.theta(values)), asked=Asked(disturbed=False))
         stds.append(fit.std["bulk_modulus"])
     assert stds[0] > 1.2 * stds[1]
 
