@@ -77,6 +77,11 @@ def test_means_stand_in_all_of_their_rows_and_rows_without_a_whole_mean_are_miss
     assert NO_MEAN.judged(plain) is plain
 
 
+@pytest.mark.parametrize(("rows", "after", "late"), [(4, 3, 1.5), (4, 2, 0.5), (4, 1, -0.5), (5, 2, 0.0), (1, 0, 0.0)])
+def test_a_mean_is_late_by_the_rows_from_the_middle_of_its_own(rows: int, after: int, late: float) -> None:
+    assert PressureMean(rows, after).late_rows == late
+
+
 def test_a_log_begins_with_the_first_row_of_a_whole_mean() -> None:
     record = Record(1e-3, {PRESSURE: np.arange(10.0)})
     assert [float(PressureMean(4, after).begun(record)[PRESSURE][0]) for after in (3, 2, 1)] == [0.0, 1.0, 2.0]
