@@ -11,6 +11,8 @@ from estimation.fits.flow.accumulator import (
     FAR_STIFFER,
     LEAST_GAS,
     MOST_GAS,
+    SOFT_DEVIATIONS,
+    first_stiffness,
     gas_contradicted,
     is_far_stiffer,
     oil_exchange,
@@ -49,6 +51,11 @@ def test_an_unstated_gas_volume_is_presumed_from_the_oil_that_the_accumulator_ex
     value, spread = presumed_stiffness(PAPER, {})[STIFFNESS]
     gas = np.array([LEAST_GAS, MOST_GAS]) * oil_exchange(PAPER)
     assert np.abs(np.log(value * gas / PAPER.accumulator_pressure)).max() < 2.0 * spread
+
+
+def test_searches_begin_at_the_soft_end_of_what_is_presumed() -> None:
+    begun = first_stiffness(replace(seen(log(0.1)), presumed={STIFFNESS: (3e8, 0.4)}))
+    assert begun == pytest.approx(3e8 / math.exp(0.4 * SOFT_DEVIATIONS))
 
 
 def test_the_accumulator_of_a_single_rod_also_exchanges_the_volume_of_its_rod() -> None:

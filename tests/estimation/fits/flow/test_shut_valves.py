@@ -34,6 +34,9 @@ def fits(makeup: float = 1e-29, std: float = np.inf, held: float = np.inf) -> An
         (fits(), AT_REST, 0.9 * REQUIRED_GAIN, [RigCode.MAKEUP_UNSEEN]),  # the log does not decide
         (fits(std=900.0), AT_REST, 1.1 * REQUIRED_GAIN, []),
         (fits(makeup=1e-8), AT_REST, 1.1 * REQUIRED_GAIN, [RigCode.MAKEUP_UNSEEN]),
+        # half as wide as in the rig file is enough for the pump's flow at the inner circuit's pressure; a fifth is not
+        (fits(makeup=0.5 * PAPER.makeup_conductance), AT_REST, 1.1 * REQUIRED_GAIN, [RigCode.MAKEUP_UNSEEN]),
+        (fits(makeup=0.2 * PAPER.makeup_conductance), AT_REST, 1.1 * REQUIRED_GAIN, [RigCode.MAKEUP_BLOCKED]),
         (fits(held=100.0 + 0.9 * LEAST_LEAD), AT_REST, 1.1 * REQUIRED_GAIN, []),  # a lumped plant has no make-up valves
         (fits(), LogTraits(moving=True), 1.1 * REQUIRED_GAIN, []),
     ],
