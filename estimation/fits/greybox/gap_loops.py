@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from estimation.arrays import Array, IntArray
-from estimation.fits.greybox.side_by_side_loops import SideBySideKernel, close, drive
-from plant.solvers.fixed_step_loops import Operation, place_rows, place_shared
+from estimation.fits.greybox.side_by_side_loops import SideBySideKernel, close, drive, place_beginning, set_pace
+from plant.solvers.fixed_step_loops import Operation, place_shared
 
 
 class GapKernel(SideBySideKernel, Protocol):
@@ -83,23 +83,18 @@ def residuals_across_gaps(
     work = room[-room.ctypes.data % 64 // 8 :]  # aligned: a vector across two cache lines takes twice as long
     slots, lanes = work.ctypes.data, kernel.LANES
     shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
-    pace = shown + kernel.OUTPUTS * lanes
-    place_rows(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     jump, covariance = np.zeros(kernel.JUMPS * lanes), np.zeros((kernel.JUMPS * kernel.JUMPS, lanes))
     place_shared(kernel, jump, 0, kernel.JUMP)
     reach, weight = np.zeros((kernel.JUMPS * kernel.JUMPS, lanes)), np.zeros(lanes)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
     n, steps, gap, loose = drives.shape[0], 0, 0, False
-    for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
-        kernel.begin_at(slots + first, 0.0)
+    place_beginning(kernel, work, parameters)
     for k in range(n):
         if k > 0:
             if substeps[k] != steps:
                 steps = substeps[k]
-                place_shared(kernel, work, pace, (sample_time / steps,))
-                for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
-                    kernel.settle_at(slots + first, 0.0)
+                set_pace(kernel, work, sample_time / steps)
             drive(kernel, work, drives, k, steps)
             for j in range(steps):
                 if loose:

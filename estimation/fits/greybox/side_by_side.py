@@ -11,7 +11,14 @@ from typing import TypeAlias
 from estimation.fits.greybox.gap_loops import carry_each, correct_each, residuals_across_gaps
 from estimation.fits.greybox.kernel import model_step
 from estimation.fits.greybox.loops import RUNAWAY, SETTLED
-from estimation.fits.greybox.side_by_side_loops import absorb, close, drive, residuals_side_by_side
+from estimation.fits.greybox.side_by_side_loops import (
+    absorb,
+    close,
+    drive,
+    place_beginning,
+    residuals_side_by_side,
+    set_pace,
+)
 from estimation.models.greybox import GreyBoxModel
 from plant.compiled.expression import Expression, as_expression, jacobian, symbol
 from plant.compiled.hoist import hoisted
@@ -115,7 +122,7 @@ def _source(model: GreyBoxModel, lanes: int) -> str:
         "NUMBERS": lanes * len(every),
         "RUNAWAY": RUNAWAY,
     }
-    parts, loop = [place_rows, place_shared, drive, absorb, close], residuals_side_by_side
+    parts, loop = [place_rows, place_shared, place_beginning, set_pace, drive, absorb, close], residuals_side_by_side
     if model.jump:
         sizes |= {
             "JUMP": model.jump,

@@ -79,20 +79,15 @@ def residuals_side_by_side(
     work = room[-room.ctypes.data % 64 // 8 :]  # aligned: a vector across two cache lines takes twice as long
     slots, lanes = work.ctypes.data, kernel.LANES
     shown = (kernel.WIDTH + 2 * kernel.DRIVES) * lanes
-    pace = shown + kernel.OUTPUTS * lanes
-    place_rows(kernel, work, pace + lanes, parameters.T, kernel.COLUMNS)
     excess, level = np.zeros((kernel.OUTPUTS, lanes)), np.zeros((kernel.OUTPUTS, lanes))
     present, spread = np.zeros(kernel.OUTPUTS), np.zeros(kernel.OUTPUTS)
     n, steps = drives.shape[0], 0
-    for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
-        kernel.begin_at(slots + first, 0.0)
+    place_beginning(kernel, work, parameters)
     for k in range(n):
         if k > 0:
             if substeps[k] != steps:
                 steps = substeps[k]
-                place_shared(kernel, work, pace, (sample_time / steps,))
-                for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
-                    kernel.settle_at(slots + first, 0.0)
+                set_pace(kernel, work, sample_time / steps)
             drive(kernel, work, drives, k, steps)
             for j in range(steps):
                 for first in range(0, 8 * lanes, 8 * kernel.VECTOR):
@@ -106,6 +101,38 @@ def residuals_side_by_side(
                     excess[i, lane] += work[shown + i * lanes + lane] - measured[k, i]
         if (k + 1) % block == 0 or k == n - 1:
             close(kernel, k // block, excess, level, present, spread, variance, walk, open_at, kept, errors)
+
+
+def place_beginning(kernel: SideBySideKernel, work: Array, parameters: Array) -> None:
+    """Store the parameters, and the states before the first sample.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        All numbers.
+    parameters : ndarray, shape (lanes, parameters)
+        Parameter rows.
+    """
+    pace = (kernel.WIDTH + 2 * kernel.DRIVES + kernel.OUTPUTS) * kernel.LANES
+    place_rows(kernel, work, pace + kernel.LANES, parameters.T, kernel.COLUMNS)
+    for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+        kernel.begin_at(work.ctypes.data + first, 0.0)
+
+
+def set_pace(kernel: SideBySideKernel, work: Array, length: float) -> None:
+    """Store the step's length, and what follows from it and the parameters.
+
+    Parameters
+    ----------
+    work : ndarray, shape (numbers,)
+        All numbers.
+    length : float
+        Of a step [s].
+    """
+    pace = (kernel.WIDTH + 2 * kernel.DRIVES + kernel.OUTPUTS) * kernel.LANES
+    place_shared(kernel, work, pace, (length,))
+    for first in range(0, 8 * kernel.LANES, 8 * kernel.VECTOR):
+        kernel.settle_at(work.ctypes.data + first, 0.0)
 
 
 def drive(kernel: SideBySideKernel, work: Array, drives: Array, k: int, steps: int) -> None:
