@@ -18,6 +18,7 @@ from estimation.fits.greybox.lateness import (
     late_and_play,
     latest_channel,
     omitted_delay_doubt,
+    residuals_and_changes,
 )
 from estimation.fits.hypotheses import LATEST
 from estimation.log_checks.clean import clean_log
@@ -28,6 +29,7 @@ from plant.eha.model import EhaParameters
 from plant.eha.simulate import CIRCUIT, simulate
 from plant.log.record import Record
 from plant.sensors.sensors import BENCH
+from tests.estimation.fits.short_logs import problem, usual
 from tests.estimation.fits.strange_logs import HEALTHY, PRESSURE, SPEED, explained, log
 from tests.thinned import thinned
 
@@ -109,6 +111,13 @@ def test_a_lag_that_looks_like_soft_oil_is_within_the_interval(frequency: float,
     assert abs(value - TIGHT.bulk_modulus) < 2.5 * std < 0.2 * TIGHT.bulk_modulus
 
 
+def test_a_late_pressure_is_the_log_of_drives_that_are_all_early() -> None:
+    one = problem()
+    _, (speed, position, pressure, *_) = residuals_and_changes(one, usual(one), one.linearised(usual(one))[0])
+    assert one.log.timed == (SPEED, "position_m", PRESSURE)
+    np.testing.assert_allclose(pressure, -speed - position, atol=0.1 * float(np.abs(pressure).max()))
+
+
 def test_a_delay_that_may_be_chance_is_no_doubt() -> None:
     assert omitted_delay_doubt({}) == 0.0
     assert omitted_delay_doubt({SPEED: (3e-4, 2.8, 0.2), PRESSURE: (2e-4, 3.0, -0.1)}) == 0.1
@@ -119,7 +128,7 @@ def test_the_lead_takes_up_a_late_speed_but_not_a_late_pressure() -> None:
     softness, rest, other = np.linalg.qr(np.random.default_rng(2).standard_normal((400, 3)))[0].T
     slopes = np.column_stack([softness, 0.9 * softness + 0.2 * rest])  # a ramp hardly tells a lead from soft oil
     change = 1e3 * LATE_NUDGE * (slopes[:, 1] + 1e-3 * other)
-    problem: Any = SimpleNamespace(
+    asked: Any = SimpleNamespace(
         log=SimpleNamespace(timed=(SPEED, "position_m", PRESSURE)),
         model=SimpleNamespace(unknowns=("bulk_modulus", LEAD)),
     )
@@ -130,7 +139,7 @@ def test_the_lead_takes_up_a_late_speed_but_not_a_late_pressure() -> None:
         fitted_bread=np.linalg.inv(slopes.T @ slopes),
         response=lambda _: np.zeros(2),
     )
-    late, _ = late_and_play(problem, known_of, 3 * [change[None]], np.array([True, True]))
+    late, _ = late_and_play(asked, known_of, 3 * [change[None]], np.array([True, True]))
     assert late[SPEED][:2] == late[PRESSURE][:2] == pytest.approx((-3.0, 4.5))
     assert late[SPEED][1] > BY_CHANCE
     assert abs(late[SPEED][2]) < 1e-6 * abs(late[PRESSURE][2])
