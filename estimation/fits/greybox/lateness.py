@@ -158,7 +158,8 @@ def late_and_play(
         kept = np.linalg.inv(np.linalg.inv(known_of.fitted_bread)[np.ix_(held, held)])[np.count_nonzero(held[:place])]
         return lambda one: float(kept @ (slopes.T @ one.ravel()))
 
-    # what a lead below zero would take up of a late pressure is left to bulk modulus; a late speed is that lead
+    # a lead below zero would absorb part of a late pressure, but there is none: bulk modulus absorbs that part.
+    # a late speed is such a lead itself
     beside_lead = softened(np.array([name != LEAD for name in names]) & told)
     answers = {channel: softened(told) if channel == SPEED else beside_lead for channel in timed}
 
