@@ -71,6 +71,14 @@ def test_a_moving_mass_off_by_a_tenth_does_not_bias_friction() -> None:
     assert abs(found.forces[2] - WHOLE) < 3.0 * found.covariance[2, 2] ** 0.5
 
 
+def test_residuals_that_last_widen_the_deviations_by_more_than_their_size() -> None:
+    """Friction that varies along the stroke doubles the residuals' power, and lasts for many windows."""
+    even, uneven = (friction_by_forces(record(by_place=by_place), RIG, RATED) for by_place in (0.0, 0.003))
+    assert even is not None
+    assert uneven is not None
+    assert np.all(np.diag(uneven.covariance) > 3.5 * np.diag(even.covariance))
+
+
 def test_an_unknown_shape_of_the_friction_law_widens_the_covariance() -> None:
     found = friction_by_forces(record(), RIG, RATED)
     assert found is not None

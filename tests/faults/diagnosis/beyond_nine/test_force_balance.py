@@ -77,7 +77,7 @@ def test_a_significant_but_small_load_is_not_accepted() -> None:
 
 
 def test_the_rig_files_load_and_two_piston_areas_are_not_reported_as_a_load() -> None:
-    rig = replace(PAPER, load_force=400.0, load_stiffness=5e3)
+    rig = replace(PAPER, load_force=400.0, load_stiffness=2e4)
     assert seen(blocks_under(rig, to_and_fro()), rig).certain == ()
     rod = replace(PAPER, area_difference=0.2)
     one = blocks_under(PAPER, to_and_fro())
