@@ -18,6 +18,7 @@ from faults.diagnosis.beyond_nine.force_balance import Loads
 from faults.diagnosis.beyond_nine.load import LoadedDiagnosis, first_guesses, with_rod_load
 from faults.diagnosis.by_circuits import diagnose_clean
 from faults.diagnosis.circuits.actuator import actuator_of
+from faults.diagnosis.circuits.class_fit import LASTING
 from faults.diagnosis.diagnose import diagnose_log
 from faults.notes import AgainstCode, ClassCode
 from plant.eha.circuit_parameters import circuit_of
@@ -166,6 +167,23 @@ def test_without_an_objection_a_load_is_named_only_if_a_circuit_follows_better_u
         found = under(Circuits(true, asks=False), shown(800.0, 5.0), monkeypatch)
         assert bool(found.notes) == named
         assert found.parameters.load_force == (800.0 if named else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("gained", "objections", "counts", "better"),
+    [(1.1, 0, 9, True), (0.9, 0, 9, False), (1.1, 1, 9, False), (0.0, 0, 8, True)],
+)
+def test_a_circuit_under_a_load_must_be_better_by_what_counts_as_one_block(
+    gained: float, objections: int, counts: int, better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diagnosis(left: float, objections: int, counts: int) -> Any:
+        board = SimpleNamespace(blocks=SimpleNamespace(counts=np.array([counts])), fits=SimpleNamespace())
+        board.fits.best = SimpleNamespace(fitted=left)
+        return SimpleNamespace(against=("objection",) * objections, scoreboard=board)
+
+    monkeypatch.setattr(load, "misfit", lambda _, fitted: fitted)
+    under, first = diagnosis(100.0 - gained * LASTING, objections, counts), diagnosis(100.0, 0, 9)
+    assert load._follows_better(under, first) is better
 
 
 def test_a_small_load_is_accepted_only_if_a_circuit_objects_without_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import pytest
 from estimation.fits.flow.log import MOST_LEAD
 from faults.conditions import CONDITIONS, parameters_for
 from faults.diagnosis.circuits.actuator import actuator_of
-from faults.diagnosis.circuits.between_samples import nuisance_unknowns, with_fitted_lead, with_motor_lead
+from faults.diagnosis.circuits.between_samples import _lead_step, nuisance_unknowns, with_fitted_lead, with_motor_lead
 from faults.diagnosis.circuits.blocks import Blocks, blocks_of
 from faults.diagnosis.circuits.circuit_runs import COORDINATES, coordinates_of, parameter_rows, predicted_outputs
 from faults.diagnosis.circuits.class_fit import fit_freely
@@ -101,6 +101,13 @@ def test_a_course_of_leakage_is_interpolated_with_the_speed() -> None:
     ended = predicted_outputs(replace(found, leakage_course=None), rows)[0]
     assert np.sqrt(np.mean((fine - ended)[:100, 0] ** 2)) > 3.0 * np.sqrt(np.mean((fine - ended)[-100:, 0] ** 2))
     assert np.all(np.sqrt(np.mean((fine - predicted_outputs(blocks, rows)[0]) ** 2, axis=0)) < 0.05 * blocks.rms)
+
+
+def test_a_lead_of_which_a_log_shows_nothing_goes_back_to_none() -> None:
+    logged = blocks_of(binary())
+    still = with_motor_lead(replace(logged, speed=np.zeros_like(logged.speed)), AHEAD)
+    fit = fit_freely(still, ACTUATOR, CONDITION)
+    assert _lead_step(still, fit, ACTUATOR) == pytest.approx(-AHEAD)
 
 
 def test_fast_logs_and_logs_without_pressure_get_no_lead() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faults.diagnosis.circuits.blocks import blocks_of
-from faults.diagnosis.circuits.two_sensors import sensor_disagreements
+from faults.diagnosis.circuits.two_sensors import _filtered_noise, sensor_disagreements
 from plant.log.record import Record
 
 
@@ -77,6 +77,15 @@ def test_a_coarse_log_of_fast_motion_does_not_make_sound_sensors_disagree(rows: 
     assert not sensor_disagreements(record, blocks_of(record))
     wrong = record.replace(velocity_m_s=-record["velocity_m_s"])
     assert sensor_disagreements(wrong, blocks_of(wrong))
+
+
+def test_filtered_noise_is_told_from_a_wrong_gain_and_a_lag() -> None:
+    rng, time = np.random.default_rng(6), 0.01 * np.arange(2000)
+    velocity = 0.05 * np.sin(2.0 * np.pi * time)
+    noise = 1e-3 * rng.standard_normal(len(time))
+    assert _filtered_noise(noise + 0.2 * velocity + 0.5 * np.gradient(velocity), velocity) == pytest.approx(
+        1e-3, rel=0.1
+    )
 
 
 def test_fast_changes_within_a_block_do_not_make_sound_sensors_disagree() -> None:
