@@ -22,5 +22,7 @@ def test_guesses_cover_the_range_of_the_paper_rigs_faults_above_a_start() -> Non
             "leakage_coefficient": 2e-13 + 11.5 * p.leakage_coefficient,
             "flow_bias": 3e-6 + 5.0 * p.flow_bias,
             "bulk_modulus": 1.3e9,
-        }
+        },
+        rel=1e-9,
+        abs=0.0,
     )

@@ -40,8 +40,8 @@ def weights(*each: float) -> Array:
 def test_lumped_leakage_is_known_even_if_neither_of_its_two_leaks_is() -> None:
     told, _ = with_lumped(found(fit()), [fit()], weights(1.0), PAPER)
     value, std = told[LEAKAGE]
-    assert value == pytest.approx(ACROSS + 0.5 * DRAINED)
-    assert std == pytest.approx(ACROSS * 0.02 * (2.0 * (1.0 - 0.99)) ** 0.5, rel=0.01)
+    assert value == pytest.approx(ACROSS + 0.5 * DRAINED, rel=1e-9, abs=0.0)
+    assert std == pytest.approx(ACROSS * 0.02 * (2.0 * (1.0 - 0.99)) ** 0.5, rel=0.01, abs=0.0)
     assert told[BIAS] == found(fit())[BIAS]
 
 
@@ -50,7 +50,7 @@ def test_leakage_is_known_no_better_than_the_discretisation_error_of_the_flow_ba
     sure = replace(fit(), covariance=1e-12 * fit().covariance)
     told, correlation = with_lumped(found(sure), [sure], weights(1.0), PAPER)
     steps = DISCRETISED * PAPER.pump_displacement * PAPER.rated_speed / PAPER.relief_pressure
-    assert told[LEAKAGE][1] == pytest.approx(steps, rel=1e-3)
+    assert told[LEAKAGE][1] == pytest.approx(steps, rel=1e-3, abs=0.0)
     assert abs(correlation) < 0.01
 
 
@@ -59,16 +59,16 @@ def test_losses_of_a_single_rod_are_known_no_better_than_its_balance_and_its_dra
     sure, single = replace(fit(), covariance=1e-12 * fit().covariance), replace(PAPER, area_difference=0.2)
     told, _ = with_lumped(found(sure), [sure], weights(1.0), single, 1e6)
     left_out = UNEVEN_SIDES * PAPER.rated_flow
-    assert told[LEAKAGE][1] == pytest.approx(np.hypot(left_out / 1e6, 0.5 * DRAINED), rel=1e-3)
+    assert told[LEAKAGE][1] == pytest.approx(np.hypot(left_out / 1e6, 0.5 * DRAINED), rel=1e-3, abs=0.0)
     assert told[BIAS][1] == pytest.approx(np.hypot(found(sure)[BIAS][1], left_out), rel=1e-3)
 
 
 def test_disagreement_between_fits_widens_the_deviation_of_leakage() -> None:
     apart = [fit(), fit(1.1 * ACROSS)]
     value, covariance = losses(apart, weights(0.5, 0.5))
-    assert value[0] == pytest.approx(1.05 * ACROSS + 0.5 * DRAINED)
+    assert value[0] == pytest.approx(1.05 * ACROSS + 0.5 * DRAINED, rel=1e-9, abs=0.0)
     assert covariance[0, 0] ** 0.5 > 0.05 * ACROSS
-    assert losses(apart, weights(1.0, 1e-30))[0][0] == pytest.approx(ACROSS + 0.5 * DRAINED)
+    assert losses(apart, weights(1.0, 1e-30))[0][0] == pytest.approx(ACROSS + 0.5 * DRAINED, rel=1e-9, abs=0.0)
 
 
 def test_an_undetermined_leak_makes_the_lumped_leakage_undetermined() -> None:
@@ -81,7 +81,7 @@ def test_an_undetermined_leak_makes_the_lumped_leakage_undetermined() -> None:
 def test_a_leakage_that_changed_is_reported_at_its_final_value() -> None:
     ended = {**found(fit()), LEAKAGE: (3.0 * ACROSS, 3.0 * fit().std[LEAKAGE])}
     (told, _), (once, _) = (with_lumped(one, [fit()], weights(1.0), PAPER) for one in (ended, found(fit())))
-    assert told[LEAKAGE] == pytest.approx(tuple(3.0 * each for each in once[LEAKAGE]))
+    assert told[LEAKAGE] == pytest.approx(tuple(3.0 * each for each in once[LEAKAGE]), rel=1e-9, abs=0.0)
 
 
 def test_the_rig_slope_of_lumped_leakage_combines_those_of_both_leaks() -> None:
