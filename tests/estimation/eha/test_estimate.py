@@ -58,7 +58,7 @@ def test_a_finding_holds_what_the_estimate_found_with_units_and_intervals() -> N
     for name, (value, std) in alone.others.items():
         one = found.quantities[name]
         assert (one.value, one.std) == (value, std)
-        assert one.ci95 == pytest.approx((value - 1.96 * std, value + 1.96 * std), rel=1e-4)
+        assert one.ci95 == pytest.approx((value - 1.96 * std, value + 1.96 * std), rel=1e-4, abs=0.0)
     assert (found.condition, found.probabilities, found.advice) == (None, {}, ())
     assert [note.code for note in found.all_notes] == [EstimateCode.KNOWN_AS_THE_RIG]
 

@@ -40,7 +40,9 @@ def published(
 
 
 def test_a_step_of_a_tenth_of_a_millisecond_adds_the_printed_noise() -> None:
-    assert [PRINTED_NOISE[state.name] * 1e-4 for state in ACCELERATION_FORM.states] == pytest.approx(list(PRINTED_Q))
+    assert [PRINTED_NOISE[state.name] * 1e-4 for state in ACCELERATION_FORM.states] == pytest.approx(
+        list(PRINTED_Q), rel=1e-9, abs=0.0
+    )
 
 
 def test_the_corrected_step_differs_from_the_printed_one_only_by_the_chamber_volume() -> None:

@@ -130,7 +130,7 @@ def test_the_interval_of_a_small_difference_of_flows_ends_at_zero() -> None:
     one = with_total(quantity(5e-12, 1e-13), {"pump_displacement": 60.0}, {"pump_displacement": Spread.of(0.03)})
     assert one.ci95_total is not None
     assert one.ci95_total[0] == 0.0
-    assert one.ci95_total[1] == pytest.approx(5e-12 * (1.0 + 60.0 * math.expm1(1.96 * 0.03)), rel=1e-3)
+    assert one.ci95_total[1] == pytest.approx(5e-12 * (1.0 + 60.0 * math.expm1(1.96 * 0.03)), rel=1e-3, abs=0.0)
 
 
 def test_a_quantity_without_known_responses_has_no_total_interval() -> None:
