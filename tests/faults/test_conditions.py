@@ -146,7 +146,7 @@ def test_at_the_highest_leakage_severity_the_rig_still_moves_and_a_little_beyond
 
 def test_parameters_are_linear_in_severity_between_and_beyond_the_levels() -> None:
     halfway = severity(1.5, 0.5)
-    assert halfway.leakage_coefficient == pytest.approx(0.5 * (2.523e-11 + 6.006e-11), rel=1e-12)
+    assert halfway.leakage_coefficient == pytest.approx(0.5 * (2.523e-11 + 6.006e-11), rel=1e-12, abs=0.0)
     assert halfway.friction_linear == pytest.approx(0.5 * (2.144e3 - 7.44e3), rel=1e-12)
     assert severity(0.0, 3.0).friction_coulomb == pytest.approx(551.0 + 51.0, rel=1e-12)
 
@@ -163,7 +163,7 @@ def test_a_rig_without_any_leakage_or_coulomb_friction_can_be_made_faulty(a: flo
 def test_a_rig_without_friction_gets_the_papers_increments_of_leakage() -> None:
     ideal = EhaParameters(friction_coulomb=0.0, friction_quadratic=0.0, friction_linear=0.0)
     added = severity(1.0, 0.0, ideal).leakage_coefficient - ideal.leakage_coefficient
-    assert added == pytest.approx(2.523e-11 - 4.784e-12, rel=1e-12)
+    assert added == pytest.approx(2.523e-11 - 4.784e-12, rel=1e-12, abs=0.0)
 
 
 @given(a=SEVERITIES, b=SEVERITIES)

@@ -54,7 +54,7 @@ def test_a_larger_push_never_gives_a_smaller_velocity(
 def test_the_velocity_is_accurate_at_a_force_barely_above_the_coulomb_force() -> None:
     excess = 1e-9
     v = float(velocity_under_friction(436.0 + excess, 1e6, 6.589e4, 436.0))
-    assert v == pytest.approx(((436.0 + excess) - 436.0) / 1e6, rel=1e-12)
+    assert v == pytest.approx(((436.0 + excess) - 436.0) / 1e6, rel=1e-12, abs=0.0)
 
 
 def test_arrays_are_solved_element_by_element() -> None:

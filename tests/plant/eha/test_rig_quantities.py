@@ -30,7 +30,7 @@ def read(tmp_path: Path, entries: str) -> object:
     ],
 )
 def test_a_quantity_is_converted(tmp_path: Path, entry: str, value: float) -> None:
-    assert getattr(read(tmp_path, entry), entry.split(" ")[0]) == pytest.approx(value, rel=1e-5)
+    assert getattr(read(tmp_path, entry), entry.split(" ")[0]) == pytest.approx(value, rel=1e-5, abs=0.0)
 
 
 def test_two_sides_may_differ_in_their_units(tmp_path: Path) -> None:

@@ -51,13 +51,13 @@ def test_sensor_errors_have_the_variances_given_to_the_filters(name: str) -> Non
     assert set(told) == set(measure(TRUTH, sensors, rng()))
     for channel, variance in told.items():
         error = measured[channel] - measured[f"true_{channel}"]
-        assert np.mean(error**2) == pytest.approx(variance, rel=0.05)
+        assert np.mean(error**2) == pytest.approx(variance, rel=0.05, abs=0.0)
         assert abs(np.mean(error)) <= 4.0 * np.sqrt(variance / len(TRUTH))
 
 
 def test_the_papers_sensors_have_the_variances_of_r_in_equation_7_7() -> None:
     told = noise_variances(PAPER)
-    assert told["position_m"] == pytest.approx(1e-12, rel=1e-12)
+    assert told["position_m"] == pytest.approx(1e-12, rel=1e-12, abs=0.0)
     assert told["velocity_m_s"] == pytest.approx(1e-4, rel=1e-12)
     assert "differential_pressure_pa" not in told
 
