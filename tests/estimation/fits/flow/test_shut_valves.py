@@ -12,6 +12,7 @@ from estimation.fits.flow.log import without_strays
 from estimation.fits.flow.log_traits import AT_REST, LogTraits
 from estimation.fits.flow.plain import FitStart, Logged, plain_fits
 from estimation.fits.flow.shut_valves import LEAST_LEAD, shut_valves
+from estimation.fits.greybox.descent import Point
 from estimation.fits.hypothesis_search.explain import REQUIRED_GAIN
 from estimation.models.completed_flow import CRACKS
 from estimation.models.flow import HELD_FLOW_FORM
@@ -49,7 +50,16 @@ def test_missing_make_up_flow_is_a_stuck_valve_only_if_the_log_contradicts_sound
     assert [note.code for note in notes] == said
 
 
-def test_searches_with_sound_valves_explain_a_sound_log_as_well_as_its_fit() -> None:
+def test_searches_with_sound_valves_explain_a_sound_log_as_well_as_its_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     record, variances = without_strays(log(2.0))
     plain = plain_fits(Logged(record, variances), FitStart(WORN, WORN.bulk_modulus))
-    assert of_valves.cost_of_sound_valves(plain, plain.best, plain.best.values[of_valves.MAKEUP]) < 1.0
+    found, least = plain.best.values[of_valves.MAKEUP], list[float]()
+    place, descend = plain.best.model.unknowns.index(of_valves.MAKEUP), of_valves.descend
+
+    def watched(at: Any, begun: Any, evaluations: int, bounds: Any, **told: Any) -> Point:
+        least.extend(np.exp([bounds[0][place], begun[place]]).tolist())
+        return descend(at, begun, evaluations, bounds, **told)
+
+    monkeypatch.setattr(of_valves, "descend", watched)
+    assert of_valves.cost_of_sound_valves(plain, plain.best, found) < 1.0
+    assert min(least) == pytest.approx(found, rel=1e-9, abs=0.0)  # no valve narrower than a sound one
