@@ -87,14 +87,15 @@ def test_a_refit_starts_at_the_scale_of_the_run_if_the_relief_valve_opened_in_it
     """From the likeliest scale, where the valve stays shut, no search recovered: a stuck make-up valve lost 2.6."""
     setting = ACTUATOR.circuit.relief_pressure
     monkeypatch.setattr(subject, "largest_pressure", lambda *_: pressure * setting)
-    fit = FITS.best
-    assert fit.run_coordinates is not None
-    expected = fit.run_coordinates if opened else fit.coordinates
+    as_run = FITS.best.coordinates + 0.1
+    fit = replace(FITS.best, run_coordinates=as_run)
+    fits = replace(FITS, best=fit)
+    expected = as_run if opened else fit.coordinates
     np.testing.assert_array_equal(subject.at_determined_scale(LOG, fit, ACTUATOR).coordinates, expected)
     begun: list[np.ndarray] = []
     monkeypatch.setattr(
-        subject, "fit_classes", lambda *_, start, **__: begun.append(start) or replace(FITS, scores=FITS.scores - 1.0)
+        subject, "fit_classes", lambda *_, start, **__: begun.append(start) or replace(fits, scores=fits.scores - 1.0)
     )
-    found = sound_circuit(LOG, FITS, ACTUATOR, nominal_runs(LOG, ACTUATOR))
+    found = sound_circuit(LOG, fits, ACTUATOR, nominal_runs(LOG, ACTUATOR))
     for start in (*begun, found.fits.best.coordinates):
         np.testing.assert_array_equal(start, expected)
