@@ -9,6 +9,7 @@ from scipy.signal import cont2discrete
 
 from estimation.identification.free_run.data import Channels, Scaling, channels_from
 from estimation.identification.free_run.doubtful_channels import (
+    _explained_by_filter,
     dependent_input_notes,
     outlier_notes,
     residual_notes,
@@ -182,3 +183,15 @@ def test_an_input_logged_late_is_distinguished_from_swapped_columns(
     both = {IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE}
     assert codes & both == {IdentificationCode[told]}
     assert not found.sound  # gains are off by many deviations
+
+
+@pytest.mark.parametrize("caused", [0.0, 0.5])
+def test_what_a_filter_explains_by_chance_does_not_count(caused: float) -> None:
+    """Fifty coefficients explain a seventh of 400 samples of any noise."""
+    found = list[float]()
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        u, noise = rng.standard_normal((400, 1)), rng.standard_normal(400)
+        left = caused**0.5 * np.roll(u[:, 0], 3) + (1.0 - caused) ** 0.5 * noise
+        found.append(_explained_by_filter([left], [u]))
+    assert np.mean(found) == pytest.approx(caused, abs=0.03)
