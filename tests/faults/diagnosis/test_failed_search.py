@@ -83,7 +83,7 @@ def test_a_circuit_gives_values_for_the_unknowns_of_the_motion_form() -> None:
     fit = leaving(1.0, 1.0, one)
     values = motion_form_values(fit, ACTUATOR)
     assert set(values) == set(UNKNOWNS) - {"speed_lead", "bristle_damping"}
-    assert values["leakage_coefficient"] == pytest.approx(PAPER.leakage_coefficient)
+    assert values["leakage_coefficient"] == pytest.approx(PAPER.leakage_coefficient, rel=1e-6, abs=0.0)
     assert values["friction_linear"] == pytest.approx(PAPER.friction_linear)
     assert values["bristle_stiffness"] == pytest.approx(PAPER.friction_coulomb / 2e-5)
     np.testing.assert_allclose(ACTUATOR.conditions[at], coordinates_of(PAPER, ACTUATOR.rated))
