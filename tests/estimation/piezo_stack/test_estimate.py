@@ -43,7 +43,7 @@ def test_air_leaks_and_friction_are_found_together_within_their_intervals(worn: 
         ("coulomb_friction", 0.05),
     ):
         truth = getattr(WORN, name)
-        assert found.values[name] == pytest.approx(truth, rel=most)
+        assert found.values[name] == pytest.approx(truth, rel=most, abs=0.0)
         assert abs(found.values[name] - truth) < 4.0 * found.deviations[name]
     assert max(found.misfit.values()) < 1.1
     bounds = stack_bounds(WORN, DRIVE, SAMPLE_TIME)
@@ -97,7 +97,7 @@ def test_noisier_sensors_with_offsets_give_the_same_values_with_larger_deviation
     assert max(found.misfit.values()) < 1.1
     for name in ("air_fraction", "chamber_leakage", "crossport_leakage", "coulomb_friction"):
         assert abs(found.values[name] - getattr(WORN, name)) < 3.0 * found.deviations[name]
-        assert found.deviations[name] == pytest.approx(10.0**0.5 * before.deviations[name], rel=0.2)
+        assert found.deviations[name] == pytest.approx(10.0**0.5 * before.deviations[name], rel=0.2, abs=0.0)
 
 
 def test_a_measured_drive_may_exceed_the_range_of_the_stack_by_its_noise(worn: Record) -> None:

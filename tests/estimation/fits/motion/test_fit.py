@@ -183,7 +183,7 @@ def test_fast_logs_are_averaged_to_a_millisecond() -> None:
     blocks = len(record["position_m"]) // 4
     means = record["position_m"][: 4 * blocks].reshape(-1, 4).mean(axis=1)
     assert log.measured[:, 0] == pytest.approx(means - means[0])
-    assert log.noise[0].variance == pytest.approx(position_variance(record["position_m"]) / 4)
+    assert log.noise[0].variance == pytest.approx(position_variance(record["position_m"]) / 4, rel=1e-6, abs=0.0)
     assert log.noise[0].walk == pytest.approx((HEALTHY.pump_displacement / HEALTHY.piston_area) ** 2 * 4.0 * 2.5e-4)
 
 
