@@ -55,7 +55,7 @@ def test_a_turbulent_share_of_leakage_is_identified_and_bulk_modulus_is_right() 
     assert abs(value - modulus) < 3.0 * std
     assert std < 0.01 * modulus
     assert abs(share - SHARE) < max(3.0 * share_std, 0.03)
-    assert fit.parameters["leakage_coefficient"][0] == pytest.approx(leakage, rel=0.03)
+    assert fit.parameters["leakage_coefficient"][0] == pytest.approx(leakage, rel=0.03, abs=0.0)
     (note,) = notes_of(found, RIG)
     assert note.code is RigCode.LEAKAGE_TURBULENT
     assert note.data["percent"] == pytest.approx(100.0 * share)

@@ -170,7 +170,7 @@ def test_an_unknown_kind_is_refused_with_the_nearest_known_name() -> None:
 def test_the_true_value_of_a_growing_leakage_is_that_at_mid_log() -> None:
     grown = make("leakage_grows", "test", 0)
     healthy, row = grown.setup.machine.leakage, truth_of(grown, "test", 0)
-    assert row["leak_coeff"] == pytest.approx(np.sqrt(healthy * 6.006e-11))
+    assert row["leak_coeff"] == pytest.approx(np.sqrt(healthy * 6.006e-11), rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize(("index", "opened"), [(0, True), (1, False)])
