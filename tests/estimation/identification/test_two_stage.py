@@ -68,3 +68,13 @@ def test_the_deviation_of_a_gain_counts_what_the_first_stage_leaves_uncertain() 
     assert len(deviations) == 8
     # without the first stage 2.5
     assert 0.5 < float(np.sqrt(np.mean(np.square(deviations)))) < 1.8
+
+
+def test_the_deviation_of_a_gain_over_the_gain_does_not_depend_on_the_inputs_unit() -> None:
+    record, shares = closed_loop(1, 200), list[float]()
+    for unit in (1.0, 1e3):
+        given = record.replace(u=unit * record["u"])
+        (found,), _ = identify_columns([given], ["u"], ["y"], references=["r"], options=FORM)
+        assert found.model.linear is not None
+        shares.append(found.model.linear.dc_gain_std / found.model.linear.dc_gain)
+    assert shares[1] == pytest.approx(shares[0], rel=1e-6)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,10 +26,16 @@ from tests.estimation.log_checks.test_averaged import over_both_sides, over_last
 RIG = EhaParameters()
 
 
-def log(drive: str, sample_time: float = 1e-3) -> Record:
+@cache
+def log(drive: str, sample_time: float) -> Record:
     rng = np.random.default_rng(11)
     p = parameters_for(CONDITIONS["minor_leakage"])
     return simulate(CIRCUIT, make_drive(drive, 5.0, sample_time, p, rng), sample_time, p, sensors=BENCH, rng=rng)
+
+
+@cache
+def raw_estimate(drive: str, sample_time: float) -> BulkModulusEstimate:
+    return estimate_bulk_modulus(log(drive, sample_time), RIG)
 
 
 def estimated(record: Record) -> BulkModulusEstimate:
@@ -50,7 +57,7 @@ def test_an_averaged_pressure_gives_the_bulk_modulus_of_the_raw_one(
     drive: str, average: Callable[[Array, int], Array], rows: int, sample_time: float
 ) -> None:
     record = log(drive, sample_time)
-    raw = estimate_bulk_modulus(record, RIG)
+    raw = raw_estimate(drive, sample_time)
     found = estimated(record.replace(**{PRESSURE: average(record[PRESSURE], rows)}))
     assert raw.value is not None
     assert raw.std is not None
@@ -92,9 +99,9 @@ def test_a_log_begins_with_the_first_row_of_a_whole_mean() -> None:
 def test_a_fit_that_is_refused_behind_a_zero_phase_filter_names_the_filter_first() -> None:
     from scipy.signal import butter, filtfilt
 
-    record = log("steps")
+    record = log("steps", 1e-3)
     smooth = record.replace(**{PRESSURE: filtfilt(*butter(2, 0.1), record[PRESSURE])})
-    sound = estimate_bulk_modulus(record, RIG)
+    sound = raw_estimate("steps", 1e-3)
     large = EstimateCode.PRESSURE_RESIDUALS_LARGE.note(ratio=9.0)
     refused = replace(sound, gate=Gate(False, (large,)))
     named = told_if_smoothed(refused, smooth)
