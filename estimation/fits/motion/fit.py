@@ -1,27 +1,25 @@
 """`fit_motion(record, parameters, ...) -> FormFit`: bulk modulus, leakage and friction of a log without pressure."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.fits.flow.log import DRAIN_START
 from estimation.fits.flow.search import LEAD_START
-from estimation.fits.greybox.block_averages import block_means, samples_a_block
 from estimation.fits.greybox.descent import Point, descend
 from estimation.fits.greybox.fit import GreyBoxFit, fit_at_solution
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
+from estimation.fits.greybox.log import GreyBoxLog
 from estimation.fits.hypothesis_search.fault_guesses import (
     FAULTS_TRIED,
     faulty_coefficient,
     flow_bias_guess,
     leakage_guess,
 )
-from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP, FormFit, likelihood_mean, with_structure
+from estimation.fits.hypothesis_search.form_fit import FormFit, likelihood_mean, with_structure
 from estimation.fits.motion.chatter import without_chatter
 from estimation.fits.motion.force_scale import Way, bulk_modulus, disagree, is_short, optimum_on_other_scales
+from estimation.fits.motion.log import motion_log
 from estimation.fits.motion.noise_annealing import RETURNING
 from estimation.fits.motion.search import (
     ENOUGH,
@@ -39,18 +37,14 @@ from estimation.fits.motion.search import (
     search_results,
 )
 from estimation.fits.motion.weakly_held import LARGEST_UNSEEN_SHIFT, is_far_too_weak, unseen_shift
-from estimation.log_checks.bridging import bridged
-from estimation.log_checks.measurement_noise import measurement_variances, position_variance
-from estimation.models.motion import MOTION_FORMS, MotionParameters
+from estimation.log_checks.measurement_noise import measurement_variances
+from estimation.models.motion import MOTION_FORMS
 from estimation.notes import EstimateCode
 from estimation.trust.consistency import MISMATCH_NIS
-from plant.arrays import Array
 from plant.eha.model import EhaParameters
 from plant.errors import LogError
 from plant.log.record import Record
 from plant.notes import Note
-from plant.runs import steps_a_sample
-from plant.solvers.steps import parameter_row
 
 MOTION_CHANNELS = ("position_m",)
 """Channels that the motion form needs beside motor speed."""
@@ -63,21 +57,6 @@ YIELD_START = 2e-5
 
 DAMPING_START = 100.0
 """First guess of the bristle's damping [N s/m]; small beside the oil's."""
-
-FINEST_STEP = 6.25e-5
-"""Longest step while the piston reverses, yields or starts [s]: the bristle's state passes through zero there."""
-
-TURNING = 0.3
-"""Speed below which the piston counts as reversing, over the log's root mean square [fraction]."""
-
-LEAST_SPEED_CHANGE = 1.0
-"""Change of motor speed between samples from which the pump counts as starting the piston [rad/s]."""
-
-SHORTEST_SAMPLE = 1e-3
-"""Logs at a shorter sample time are averaged to about this one [s]: nothing faster in the model is visible."""
-
-MOST_SAMPLES = 30_000
-"""A longer log is fitted on its beginning, which gives an interval under a percent long before."""
 
 STRUCTURE = 0.005
 """Relative standard deviation of bulk modulus due to the unknown friction law. On the foreign bench, whose presliding
@@ -185,53 +164,6 @@ def share_of_motion(chi_square: float, log: GreyBoxLog) -> float:
     steps = position[samples:] - position[:-samples]
     moved = float(np.sqrt(np.nanmean(steps**2))) if np.any(np.isfinite(steps)) else 0.0
     return float(np.sqrt(chi_square * noise.variance)) / moved if moved > 0.0 else float("inf")
-
-
-def motion_log(
-    record: Record, p: EhaParameters, uncertainties: Mapping[str, float], speed_variance: float
-) -> GreyBoxLog:
-    """Return a log as the motion form is fitted to it.
-
-    Parameters
-    ----------
-    record : Record
-        The log, with position.
-    uncertainties : Mapping[str, float]
-        Relative standard deviation of the actuator's parameters [fraction].
-    speed_variance : float
-        Measurement variance of motor speed [rad^2/s^2].
-
-    Returns
-    -------
-    GreyBoxLog
-        Its beginning of at most `MOST_SAMPLES`, averaged to `SHORTEST_SAMPLE`.
-    """
-    block = samples_a_block(record.sample_time, SHORTEST_SAMPLE)
-    sample_time = block * record.sample_time
-    speed, position = (block_means(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
-    moved = bridged(position)
-    drives = np.column_stack([bridged(speed), moved])
-    drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
-    return GreyBoxLog(
-        drives=drives,
-        measured=(position - moved[0])[:, None],
-        parameters=parameter_row(MotionParameters(**{one.name: getattr(p, one.name) for one in fields(p)})),
-        sample_time=sample_time,
-        steps=_steps(drives, sample_time),
-        noise=(OutputNoise(position_variance(record["position_m"]) / block, drift),),
-        uncertainties=uncertainties,
-    )
-
-
-def _steps(drives: Array, sample_time: float) -> NDArray[np.int64]:
-    """Return the model steps up to each sample: short ones where the piston reverses or starts."""
-    reach = max(1, round(5e-3 / sample_time))
-    sums = np.cumsum(np.pad(drives[:, 1] - drives[0, 1], (reach + 1, reach), mode="symmetric"))
-    pace = np.gradient(sums[2 * reach + 1 :] - sums[: -2 * reach - 1])  # proportional to the mean velocity
-    turning = np.abs(pace) < TURNING * np.sqrt(np.mean(pace**2))
-    set_off = np.abs(np.diff(drives[:, 0], prepend=drives[0, 0])) > LEAST_SPEED_CHANGE
-    fine, coarse = (steps_a_sample(sample_time, step) for step in (FINEST_STEP, LONGEST_STEP))
-    return np.where(turning | set_off, fine, coarse)
 
 
 def _starts(p: EhaParameters, bulk_modulus: float) -> list[dict[str, float]]:

@@ -10,7 +10,8 @@ import numpy as np
 
 from estimation.fits.flow.search import LEAD_START
 from estimation.fits.greybox.freed_problem import FreedProblem
-from estimation.fits.motion.fit import DAMPING_START, motion_log, share_of_motion
+from estimation.fits.motion.fit import DAMPING_START, share_of_motion
+from estimation.fits.motion.log import motion_log
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS
 from plant.eha.model import EhaParameters
 from plant.log.record import Record

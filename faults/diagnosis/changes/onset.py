@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimation.finding import Change
+from estimation.log_checks.still_beginning import without_still_beginning
 from faults.conditions import CONDITIONS
 from faults.diagnosis.changes.change_odds import gain_of_parts, is_change_believed
 from faults.diagnosis.changes.end_stop import with_end_stop
@@ -116,7 +117,7 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
     ----------
     record : Record
         The log. If it is longer than `LONGEST`, the part about the last change that `watch_record` finds is used, or
-        its beginning if there is none.
+        its beginning if there is none, from just before it first moves.
 
     Returns
     -------
@@ -132,7 +133,7 @@ def last_part(record: Record, actuator: Actuator) -> LastPart:
         found = _last_part_of_window(window, actuator)
         if found.onset is not None:
             return found
-    return _last_part_of_window(record, actuator)
+    return _last_part_of_window(without_still_beginning(record, LONGEST), actuator)
 
 
 def _last_part_of_window(window: Record, actuator: Actuator) -> LastPart:

@@ -25,7 +25,8 @@ from estimation.fits.hypothesis_search.predicted_gains import NO_GAIN, Predicted
 from estimation.fits.hypothesis_search.wide_log import widened_log
 from estimation.fits.hypothesis_search.wide_problem import flow_bounds, hypothesis_problem, own_starts
 from estimation.fits.motion import fit as motion_fit
-from estimation.fits.motion.fit import _starts, _steps, motion_log
+from estimation.fits.motion.fit import _starts
+from estimation.fits.motion.log import _steps, motion_log
 from estimation.fits.motion.search import MOST_WORK, MotionSearch, SharedState, explained_cost, rough_problem
 from estimation.fits.motion.weakly_held import unseen_shift
 from estimation.models.flow import FLOW_FORM, HELD_FLOW_FORM, MASS_FLOW_FORM, STIFFNESS

@@ -27,7 +27,8 @@ from estimation.fits.hypothesis_search import coarse_search, explain, final_fits
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import force_scale
 from estimation.fits.motion import search as motion_search
-from estimation.fits.motion.fit import _fitted, _starts, motion_log
+from estimation.fits.motion.fit import _fitted, _starts
+from estimation.fits.motion.log import motion_log
 from estimation.fits.motion.search import MotionSearch, search_results
 from estimation.models.motion import MOTION_FORMS
 from plant.arrays import Array

@@ -24,8 +24,9 @@ from estimation.fits.hypothesis_search.predicted_gains import PredictedGain, pre
 from estimation.fits.hypothesis_search.wide_log import usual_values, without_delays
 from estimation.fits.hypothesis_search.wide_problem import hypothesis_problem, own_starts
 from estimation.fits.motion import fit as motion_fit
-from estimation.fits.motion.fit import _starts, _steps, motion_log
+from estimation.fits.motion.fit import _starts
 from estimation.fits.motion.force_scale import disagree
+from estimation.fits.motion.log import _steps, motion_log
 from estimation.fits.motion.search import MotionSearch
 from estimation.models.flow import FLOW_FORM, STIFFNESS
 from estimation.models.motion import LINEAR, MOTION_FORMS, UNKNOWNS

@@ -11,8 +11,9 @@ from estimation.fits.hypothesis_search.form_fit import FormFit
 from estimation.fits.motion import fit as motion_fit
 from estimation.fits.motion import search as motion_search
 from estimation.fits.motion.fit import fit_motion
+from estimation.fits.motion.log import motion_log
 from estimation.fits.motion.search import MotionSearch, SearchResult, SharedState, search_results
-from estimation.log_checks.measurement_noise import measurement_variances, position_variance
+from estimation.log_checks.measurement_noise import measurement_variances
 from estimation.models.motion import MOTION_FORMS, UNKNOWNS
 from estimation.notes import EstimateCode
 from faults.conditions import CONDITIONS, parameters_for
@@ -36,7 +37,7 @@ def short_log(seconds: float, seed: int = 1, sample_time: float = 1e-3) -> Recor
 
 
 def seen(record: Record, speed_variance: float = 1e-4) -> GreyBoxLog:
-    return motion_fit.motion_log(record, HEALTHY, {}, speed_variance)
+    return motion_log(record, HEALTHY, {}, speed_variance)
 
 
 def heard(record: Record) -> GreyBoxLog:
@@ -174,32 +175,6 @@ def test_speed_noise_is_estimated_from_the_log_if_no_variance_is_given(monkeypat
         fit_motion(record, HEALTHY, 0.0, variances=variances)
     assert np.array(walks) / walks[0] == pytest.approx([1.0, 1.0, 4.0])
     assert guesses == pytest.approx([1e-2 * HEALTHY.bulk_modulus] * 3)  # no search starts from a first guess of zero
-
-
-def test_fast_logs_are_averaged_to_a_millisecond() -> None:
-    record = short_log(0.3, sample_time=2.5e-4)
-    log = seen(record, speed_variance=4.0)
-    assert log.sample_time == pytest.approx(1e-3)
-    blocks = len(record["position_m"]) // 4
-    means = record["position_m"][: 4 * blocks].reshape(-1, 4).mean(axis=1)
-    assert log.measured[:, 0] == pytest.approx(means - means[0])
-    assert log.noise[0].variance == pytest.approx(position_variance(record["position_m"]) / 4, rel=1e-6, abs=0.0)
-    assert log.noise[0].walk == pytest.approx((HEALTHY.pump_displacement / HEALTHY.piston_area) ** 2 * 4.0 * 2.5e-4)
-
-
-def test_the_end_of_a_very_long_log_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_fit, "MOST_SAMPLES", 100)
-    assert seen(short_log(0.3)).drives.shape == (100, 2)
-
-
-def test_steps_are_short_at_piston_reversals_and_pump_starts() -> None:
-    t = 1e-3 * np.arange(400)
-    speed = np.where(t > 0.2, 50.0, 0.0)  # starts at sample 201
-    position = 1e-2 * np.abs(t - 0.1)  # reverses at sample 100
-    steps = motion_fit._steps(np.column_stack([speed, position]), 1e-3)
-    assert set(steps) == {4, 16}
-    fine = np.flatnonzero(steps[5:-5] == 16) + 5  # smoothing distorts the ends
-    assert list(fine) == [99, 100, 101, 201]
 
 
 def test_first_guesses_spread_over_the_faults_and_none_is_zero() -> None:

@@ -101,6 +101,19 @@ def test_without_pressure_no_onset_is_sought_in_a_log_with_drifting_leakage() ->
     assert last_part(drifts.replace(differential_pressure_pa=None), ACTUATOR).onset is None
 
 
+@pytest.mark.parametrize("pressure", [True, False])
+def test_a_long_log_that_stands_still_at_first_is_judged_where_it_moves(*, pressure: bool) -> None:
+    """Before, the first 30 s alone were judged: leakage of a log without pressure was that of the prior, 1.1 L/min."""
+    rng = np.random.default_rng(11)
+    speed = np.concatenate([np.zeros(round(32.0 / 2e-3)), make_drive("steps", 4.0, 2e-3, HEALTHY, rng)])
+    leaks = circuit_of(parameters_for(CONDITIONS["minor_leakage"]))
+    record = simulate(CIRCUIT, speed, 2e-3, leaks, sensors=RIG, rng=rng)
+    found = diagnosed(record if pressure else record.replace(differential_pressure_pa=None))
+    assert found.condition == "minor_leakage"
+    assert found.scoreboard.window.start_time == pytest.approx(31.5, abs=0.1)
+    assert found.severity["leakage_flow"].value == pytest.approx(6.05, rel=0.1)
+
+
 def test_oil_that_softens_between_two_parts_is_an_objection_only_without_pressure() -> None:
     blocks = blocks_of(foreign("air_midway", 703).replace(differential_pressure_pa=None))
     two = two_parts(blocks, fit_classes(blocks, ACTUATOR), ACTUATOR)
