@@ -10,6 +10,7 @@ from estimation.fits.greybox.block_averages import means_across, samples_a_block
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged
+from estimation.log_checks.coarse_means import coarse_mean_variance
 from estimation.log_checks.measurement_noise import position_variance
 from estimation.log_checks.still_beginning import without_still_beginning
 from estimation.models.motion import MotionParameters
@@ -58,7 +59,9 @@ def motion_log(
     sample_time = block * record.sample_time
     record = without_still_beginning(record, MOST_SAMPLES * sample_time)
     speed, position = (means_across(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
-    variance = position_variance(record["position_m"]) / samples_behind_a_mean(record["position_m"], block)
+    logged = record["position_m"]
+    variance = position_variance(logged) / samples_behind_a_mean(logged, block)
+    variance = max(variance, coarse_mean_variance(logged, block))
     drives = np.column_stack([bridged(speed), bridged(position)])
     drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
     return GreyBoxLog(

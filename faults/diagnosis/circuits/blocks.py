@@ -15,6 +15,7 @@ from estimation.arrays import IntArray
 from estimation.eha.explanation_notes import LEAKAGE_COURSE
 from estimation.log_checks.bridging import bridged, bridged_slow_channel
 from estimation.log_checks.channel_names import PRESSURE
+from estimation.log_checks.coarse_means import coarse_mean_variance
 from estimation.log_checks.dropout import long_gaps
 from estimation.log_checks.measurement_noise import measurement_variances, position_variance
 from faults.diagnosis.circuits.beginning import SETTLING, beginning_of
@@ -219,6 +220,9 @@ def blocks_of(record: Record) -> Blocks:
     elif "position_m" in rows:
         share = 2.0 * min(1.0, rows["position_m"] / pooled)
         noise[0] = (position_variance(record["position_m"]) * share) ** 0.5 / (block * sample_time)
+    elif _uses_position(whole):
+        lasting = (2.0 * coarse_mean_variance(record["position_m"], pooled)) ** 0.5 / (block * sample_time)
+        noise[0] = max(float(noise[0]), lasting)
     return Blocks(
         speed,
         sample_time,

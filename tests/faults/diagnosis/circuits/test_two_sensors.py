@@ -47,6 +47,21 @@ def test_filtered_noise_alone_does_not_make_the_sensors_disagree(gain: float, di
     assert bool(sensor_disagreements(wandering, blocks_of(wandering))) == differs
 
 
+@pytest.mark.parametrize(("gain", "differs"), [(1.0, False), (6.0, True)])
+def test_an_encoder_of_few_counts_in_a_fast_log_is_not_wrong(gain: float, differs: bool) -> None:
+    """A mean over a millisecond is as wrong as one sample while the reading stays; before, it counted as a tenth."""
+    time = 1e-4 * np.arange(30_001)
+    velocity = gain * 4e-3 * np.sin(2.0 * np.pi * time)
+    path = 4e-3 / (2.0 * np.pi) * (1.0 - np.cos(2.0 * np.pi * time))
+    channels = {
+        "motor_speed_rad_s": 100.0 * np.sin(2.0 * np.pi * time),
+        "position_m": 5e-5 * np.round(path / 5e-5),
+        "velocity_m_s": velocity + np.random.default_rng(4).normal(0.0, 1e-4, len(time)),
+    }
+    record = Record(1e-4, channels)
+    assert bool(sensor_disagreements(record, blocks_of(record))) == differs
+
+
 def test_a_single_sensor_cannot_disagree() -> None:
     record = with_two_sensors(2.0, 1e-6).replace(position_m=None)
     assert not sensor_disagreements(record, blocks_of(record))
