@@ -10,6 +10,7 @@ from experiments.page.condition_names import condition_in_words
 from experiments.page.numbers import decimals_of, percent_text, shop_unit
 from experiments.page.sentences import sentence
 from faults.diagnosis.beyond_nine.left_open import LEAST_REPORTED
+from faults.notes import AgainstCode
 
 SEVERITY_NAMES = {
     "leakage_flow": "leakage at rated pressure",
@@ -36,6 +37,9 @@ log has no information that separates them, and calibrated probabilities are not
 
 NEAREST_WORDS = "UNKNOWN: none of the nine conditions fits; the nearest is "
 """Beginning of a verdict with evidence against it."""
+
+STILL_WORDS = "UNKNOWN: the piston stands still, which several conditions and a blocked rod explain; the likeliest is "
+"""The same where the conditions fit, but a blocked rod does too."""
 
 OUTSIDE_WORDS = "none of the nine conditions"
 """Label of the probability left over by all nine conditions, for a fault that the log does not exclude."""
@@ -89,7 +93,10 @@ def headline(result: Mapping[str, Any]) -> str:
     (best, first), (second, other) = ranked_shares(result["probabilities"], unknown=result["unknown"])[:2]
     if result["unknown"]:
         nearest = f"{condition_in_words(best)} ({percent_text(first)} % if it had to be one of them)"
-        return f"{NEAREST_WORDS}{nearest}, then {condition_in_words(second)} ({percent_text(other)} %)"
+        alone = len(result.get("reasons", ())) == 1  # another reason may say that no condition fits
+        still = alone and any(note["code"] == AgainstCode.STUCK_OR_LEAKS for note in result.get("notes", ()))
+        words = STILL_WORDS if still else NEAREST_WORDS
+        return f"{words}{nearest}, then {condition_in_words(second)} ({percent_text(other)} %)"
     if len(as_likely := equally_likely(result)) > 1:
         told = _shared_fault(as_likely, result["probabilities"])
         faulty = result["since_s"] is not None or not told[0].startswith(f"{LEVELS_IN_WORDS['none']} ")

@@ -119,6 +119,15 @@ def test_normal_leakage_with_undetermined_friction_is_not_dated_as_a_fault() -> 
     )
 
 
+def test_a_piston_that_stands_still_is_not_said_to_fit_no_condition() -> None:
+    """Before, "none of the nine conditions fits" stood above a verdict by which several do."""
+    still = AgainstCode.STUCK_OR_LEAKS.note(moved_m=4e-5, pumped_m=9e-3)
+    said = headline(diagnosis_entries(found_as("major_leakage", against=(still,))))
+    assert said.startswith("UNKNOWN: the piston stands still, which several conditions and a blocked rod explain; the ")
+    both = headline(diagnosis_entries(found_as("major_leakage", against=(still, *AGAINST))))
+    assert both.startswith("UNKNOWN: none of the nine conditions fits")
+
+
 def test_a_verdict_with_reasons_against_it_begins_with_unknown_and_lists_them() -> None:
     entries = diagnosis_entries(found_as("minor_leakage", against=AGAINST))
     assert headline(entries).startswith("UNKNOWN: none of the nine conditions fits; the nearest is minor leakage")
