@@ -22,7 +22,7 @@ def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
     path : Path
         The file to write.
     kind : str
-        Name of the writer, with the number of its format: ``hydrostate watch 3``.
+        Name of the writer, with the number of its format: ``hydrostate watch 4``.
     values : Mapping[str, ndarray], each of its own shape
         Numbers or texts by name [any unit].
 
@@ -41,15 +41,15 @@ def write_kept(path: Path, kind: str, values: Mapping[str, Any]) -> None:
         raise HydrostateError(f"{path}: the state cannot be written: {error.strerror or error}") from error
 
 
-def read_kept(path: Path, kind: str) -> dict[str, Array]:
+def read_kept(path: Path, *kinds: str) -> dict[str, Array]:
     """Read arrays from a file of a given kind.
 
     Parameters
     ----------
     path : Path
         A file written by `write_kept`.
-    kind : str
-        Expected name of the writer.
+    *kinds : str
+        Names of the writers whose files can be read, the newest first.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
     HydrostateError
         If the file cannot be read or is of another kind.
     """
-    wanted = f"a state of {kind.rpartition(' ')[0]} is needed"
+    wanted = f"a state of {kinds[0].rpartition(' ')[0]} is needed"
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:  # NumPy leaves a damaged file open
             values = {name: kept[name] for name in kept.files}
@@ -69,6 +69,8 @@ def read_kept(path: Path, kind: str) -> dict[str, Array]:
         raise HydrostateError(f"{path}: {wanted}: {error.strerror or error}") from error
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:  # NumPy's own message is about pickles
         raise HydrostateError(f"{path}: {wanted}, the file holds none, or is damaged") from error
-    if str(values.pop("format", "")) != kind:
-        raise HydrostateError(f"{path}: {wanted}, the file is none of this version")
+    found = str(values.pop("format", ""))
+    if found not in kinds:
+        of = f"the file is one of {found[:60]!r}" if found else "the file is no state"
+        raise HydrostateError(f"{path}: {wanted}, {of}, which this version cannot continue; to begin again, delete it")
     return values

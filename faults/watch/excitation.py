@@ -28,7 +28,11 @@ STALE = 8.0
 """Memories after which a class that did not occur is learnt again: the balances have forgotten its drive."""
 
 LARGEST_SCORE = 8.0
-"""Cap of a block's score [standard deviations]: no single block decides."""
+"""Cap of a block's score [standard deviations]."""
+
+WIDENED = 2.0
+"""Widening of the deviation of a class that is known from few blocks, over the root of one over their number
+[dimensionless]: as for a span of the loss."""
 
 LEAST_BLOCKS = 20.0
 """Number of blocks of a class before its scores count [count]."""
@@ -74,7 +78,8 @@ def standardise(value: float, memory: float, judged: bool, least: float, now: fl
     usual[LAST_BLOCK] = now
     away, score = value - usual[MEAN], 0.0
     if judged and usual[COUNT] >= LEAST_BLOCKS:
-        score = min(away / max(math.sqrt(usual[VARIANCE] + 1e-12), least), LARGEST_SCORE)
+        few = 1.0 + WIDENED * (1.0 / math.sqrt(usual[COUNT]) - 1.0 / math.sqrt(memory))
+        score = min(away / (few * max(math.sqrt(usual[VARIANCE] + 1e-12), least)), LARGEST_SCORE)
     usual[COUNT] = min(usual[COUNT] + 1.0, memory)
     share = 1.0 / usual[COUNT]
     usual[MEAN] += share * away

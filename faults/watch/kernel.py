@@ -41,6 +41,8 @@ from faults.watch.memory import (
     OCTAVE,
     POSITION,
     PRESSURE_SUM,
+    RESTARTED,
+    RESTED,
     SAMPLES,
     SCORED,
     SOUND,
@@ -72,6 +74,10 @@ INTERVALS = 10
 NOTHING, READY, LOSS = -1, 100, 101
 """Possible results of a block, besides the balance that raises an alarm: nothing, the thresholds have been learnt, and
 the loss has grown."""
+
+RELEARN = 4.0
+"""Least motion between two pauses that restart learning, over the motion in which scores do not count then
+[dimensionless]: at most a quarter of the motion is not judged, however often the actuator pauses."""
 
 REFRESHED = 200
 """Number of blocks between two updates of the thresholds."""
@@ -150,7 +156,12 @@ def end_block(setting: WatchSetting, sizes: WatchSizes, memory: Memory, factor: 
         partial[OCTAVE] = OCTAVES
         memory.scores[:, place] = np.nan
         score[:, SQUARES] = 0.0
+        clock[RESTED] += 1.0
         return NOTHING
+    rested, clock[RESTED] = clock[RESTED], 0.0
+    if rested >= sizes.pause and clock[USABLE] - clock[RESTARTED] >= RELEARN * sizes.resume:
+        begin_again(memory)
+        clock[RESTARTED] = clock[USABLE]
     clock[USABLE] += 1.0
     since = clock[USABLE] - clock[LEARNT_FROM]
     news = score_balances(setting, sizes, memory, factor, moved, since, excited, place)
@@ -251,7 +262,7 @@ def drop_span(memory: Memory) -> None:
 
 
 def begin_again(memory: Memory) -> None:
-    """Forget most of the balances' state after an alarm, so that they are learnt again; peaks are kept."""
+    """Forget most of the balances' state after an alarm or a pause, so that they are learnt again; peaks are kept."""
     information, moment, score = memory.information, memory.moment, memory.score
     memory.clock[LEARNT_FROM] = memory.clock[USABLE]
     information *= 0.01
@@ -272,7 +283,7 @@ def watch_kernel() -> NativeKernel:
         if name.isupper() and isinstance(value, int | float)
     }
     constants |= {"NOTHING": NOTHING, "READY": READY, "LOSS": LOSS, "REFRESHED": REFRESHED, "INTERVALS": INTERVALS}
-    constants |= {"ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
+    constants |= {"RELEARN": RELEARN, "ALLOWANCE": ALLOWANCE, "LEVEL": LEVEL, "MOVING": MOVING}
     of_balances = (
         regress,
         shift,

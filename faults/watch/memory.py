@@ -20,7 +20,7 @@ LEVELS = 4096
 KEPT_SPANS = 512
 """Number of spans whose loss is remembered."""
 
-PARTIAL, CLOCK, LAGS, SCORE = 10, 4, 8, 4
+PARTIAL, CLOCK, LAGS, SCORE = 10, 6, 8, 4
 """Lengths of arrays: the current interval and block, the clock, the last intervals, and a balance's score."""
 
 SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE, FAST_SUM = range(PARTIAL)
@@ -28,9 +28,9 @@ SAMPLES, SPEED_SUM, PRESSURE_SUM, POSITION, SOUND, MOVED, WHOLE, CHANGED, OCTAVE
 and position at its beginning [m]; consecutive sound intervals; intervals of the block in which the actuator moved, and
 all its intervals; its sum of squared speed changes, the octave of the last block, and the sum of speeds."""
 
-ALL, USABLE, LEARNT_FROM, SCORED = range(CLOCK)
-"""Indices in the clock: blocks so far, those in motion, the number of these when learning last restarted, and those
-whose scores counted."""
+ALL, USABLE, LEARNT_FROM, SCORED, RESTED, RESTARTED = range(CLOCK)
+"""Indices in the clock: blocks so far, those in motion, the number of these when learning last restarted, those whose
+scores counted; those at rest since the last one in motion, and those in motion when a pause last restarted learning."""
 
 
 class Memory(NamedTuple):
@@ -40,7 +40,7 @@ class Memory(NamedTuple):
     ----------
     partial : ndarray, shape (10,)
         The current interval and block, by index: see `SAMPLES`.
-    clock : ndarray, shape (4,)
+    clock : ndarray, shape (6,)
         Counters of blocks [count], by index: see `ALL`.
     lags : ndarray, shape (8,)
         The last intervals, by index: see `faults.watch.balances.V1`.
@@ -118,12 +118,13 @@ class WatchSetting(NamedTuple):
 
 
 class WatchSizes(NamedTuple):
-    """Samples in an interval; blocks to settle, to learn, and until scores count again [count]."""
+    """Samples in an interval; blocks to settle, to learn, until scores count again, and of a long pause [count]."""
 
     samples: int
     settle: int
     learning: int
     resume: int
+    pause: int
 
 
 def empty_memory(balances: int, loss_threshold: float) -> Memory:

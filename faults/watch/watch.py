@@ -76,6 +76,9 @@ LEARNING = 120.0
 LEAST_LEARNING, MOST_LEARNING = 60.0, 1e7
 """Shortest and longest healthy running that can be set before alarms; judged [s]."""
 
+PAUSE = 60.0
+"""Standstill after which the balances are learnt again, as after missing rows: oil has cooled; judged [s]."""
+
 AFTER = 2.0
 """Running time after an alarm from which the change of the gains is determined [s]."""
 
@@ -140,7 +143,7 @@ class Watch:
         allowed = false_alarms * duration / 3600.0
         self._setting = WatchSetting(fade, SCORE_MEMORY / duration, (1.0 - SLOW_SHARE) * allowed, *scales)
         settle = round(SETTLE / duration)
-        self._sizes = WatchSizes(samples, settle, round(learning / duration), 3 * settle)
+        self._sizes = WatchSizes(samples, settle, round(learning / duration), 3 * settle, round(PAUSE / duration))
         self._memory = empty_memory(len(balances), loss_threshold(SLOW_SHARE * SPAN * allowed))
         self._partial, self._clock = self._memory.partial, self._memory.clock
         self._score, self._known = self._memory.score, self._memory.known
@@ -192,8 +195,7 @@ class Watch:
         while place < len(rows):
             stop = len(rows)
             if self._open is not None:
-                due = self._open[2] * self.block - self._taken
-                stop = min(stop, place + max(due, 1))
+                stop = min(stop, place + max(self._open[2] * self.block - self._taken, 1))
             place, news = kernel.advance(rows[:stop], place, self._setting, self._sizes, self._memory)
             if news == READY:
                 events.append(Ready(self.time, self.thresholds))
@@ -270,7 +272,7 @@ class Watch:
     def _taken(self) -> int:
         """Samples taken, including those of the current block."""
         intervals = int(self._clock[ALL]) * INTERVALS + int(self._partial[WHOLE])
-        return intervals * (self.block // INTERVALS) + int(self._partial[SAMPLES])
+        return intervals * self._sizes.samples + int(self._partial[SAMPLES])
 
     def _raise_alarm(self, which: int) -> Alarm:
         found, likely = change_time(self._recent_scores(which))
@@ -317,8 +319,7 @@ class Watch:
         if not self.pressure or min(*before[[GAIN_WP, GAIN_VV]], *after[[GAIN_WP, GAIN_VV]]) <= 0.0:
             return [Change(self.time, alarm, None, None)]
         lost = float(before[GAIN_QP] / before[GAIN_WP]), float(after[GAIN_QP] / after[GAIN_WP])
-        resistance = before[GAIN_PV] / before[GAIN_VV], after[GAIN_PV] / after[GAIN_VV]
-        resisted = float(resistance[1] / resistance[0] - 1.0)
+        resisted = float(after[GAIN_PV] / after[GAIN_VV] / (before[GAIN_PV] / before[GAIN_VV]) - 1.0)
         over_pressure = after[GAIN_QP] / after[GAIN_PP] * before[GAIN_PP] / before[GAIN_WP]  # as under the earlier load
         if min(lost[1], over_pressure) - lost[0] > oil_allowance(lost[0]):  # so that the slow alarm does not repeat it
             learn_loss_again(self._known)
@@ -333,7 +334,7 @@ def watch_record(
     Parameters
     ----------
     record : Record
-        The log, with motor speed, position or velocity, and differential pressure if there is one.
+        With motor speed, position or velocity, and differential pressure if there is one.
     false_alarms : float
         Rate of false alarms in a healthy log [1/h].
     learning : float
@@ -345,5 +346,5 @@ def watch_record(
         If a channel is missing, or a rate or time is not usable.
     """
     samples, pressure = watched_samples({name: record[name] for name in record}, record.sample_time)
-    options = {"false_alarms": false_alarms, "learning": learning, "start": record.start_time}
-    return Watch(parameters, record.sample_time, pressure=pressure, **options).take(samples)
+    options = {"pressure": pressure, "false_alarms": false_alarms, "learning": learning, "start": record.start_time}
+    return Watch(parameters, record.sample_time, **options).take(samples)

@@ -15,7 +15,9 @@ def test_a_state_is_read_back_and_refused_as_another_kind(tmp_path: Path) -> Non
     found = read_kept(path, "watch 1")
     assert list(found) == ["mean"]
     np.testing.assert_array_equal(found["mean"], np.arange(3.0))
-    with pytest.raises(HydrostateError, match=r"watch\.state: a state of watch is needed, the file is none of this"):
+    with pytest.raises(
+        HydrostateError, match=r"watch\.state: a state of watch is needed, the file is one of 'watch 1'.*delete it"
+    ):
         read_kept(path, "watch 2")
 
 

@@ -84,3 +84,12 @@ def test_no_class_is_tighter_than_its_least_deviation() -> None:
     for least, score in ((0.0, 2.5), (0.4, 1.25)):
         usual = np.array([-6.0, 0.04, 300.0, 0.0])
         assert standardise(-5.5, 300.0, True, least, 1.0, usual) == pytest.approx(score)
+
+
+def test_a_class_of_few_blocks_scores_less_than_one_that_is_well_known() -> None:
+    """Before, a block of a class seen twenty times had the score of one that is known for long."""
+    scores = []
+    for blocks in (LEAST_BLOCKS, 300.0):
+        usual = np.array([-6.0, 0.09, blocks, 0.0])
+        scores.append(standardise(-4.5, 300.0, True, 0.0, 0.0, usual))
+    assert scores == [pytest.approx(5.0 / (1.0 + 2.0 * (20.0**-0.5 - 300.0**-0.5))), pytest.approx(5.0)]

@@ -8,6 +8,7 @@ from faults.watch.saved import load_state, save_watch
 from faults.watch.watch import Watch
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
+from plant.kept import write_kept
 
 P, T = EhaParameters(), 5e-3
 
@@ -50,5 +51,19 @@ def test_a_state_of_other_settings_and_an_invalid_state_file_are_refused(tmp_pat
     with pytest.raises(HydrostateError, match="a state of hydrostate watch is needed"):
         load_state(wrong)
     np.savez(wrong, format=np.array("another"))
-    with pytest.raises(HydrostateError, match="none of this version"):
+    with pytest.raises(
+        HydrostateError, match="'another', which this version cannot continue; to begin again, delete it"
+    ):
         load_state(wrong)
+
+
+def test_a_state_of_the_format_before_pauses_were_counted_is_continued(tmp_path: Path) -> None:
+    rows, path = samples(100.0, leak_from=90.0), tmp_path / "state.npz"
+    whole, first = Watch(P, T, learning=60.0), Watch(P, T, learning=60.0)
+    wanted, before = whole.take(rows), first.take(rows[:14_000])
+    kept = first.remembered()
+    kept["memory_1"], kept["asked"] = kept["memory_1"][:4], kept["asked"][:-1]
+    write_kept(path, "hydrostate watch 3", {"sample_time": np.array(T), "travelled": np.array(0.0), **kept})
+    second = Watch(P, T, learning=60.0)
+    second.resume(load_state(path)[0])
+    assert before + second.take(rows[14_000:]) == wanted

@@ -3,6 +3,7 @@ import pytest
 
 from faults.watch.events import Alarm, Change, Ready
 from faults.watch.kernel import watch_kernel
+from faults.watch.memory import RESTARTED
 from faults.watch.watch import Watch, watch_record
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
@@ -99,6 +100,27 @@ def test_missing_samples_and_rest_raise_no_alarm() -> None:
     samples[40000:50000] = [0.0, samples[40000, 1], 0.0]
     samples[50000:, 1] += samples[40000, 1] - samples[50000, 1]
     assert not [event for event in Watch(P, T, learning=60.0).take(samples) if isinstance(event, Alarm)]
+
+
+def _after_a_stop(still: float, lost: float, seed: int = 11) -> np.ndarray:
+    """Return a minute and a half of motion, a standstill, and half a minute in which the piston loses more speed."""
+    samples = _run(leak_from=90.0, seconds=120.0, seed=seed)
+    share = lost / 0.25
+    away = samples[45_000:, 1] - samples[45_000, 1]
+    healthy = _run(seconds=120.0, seed=seed)
+    as_before = healthy[45_000:, 1] - healthy[45_000, 1]
+    samples[45_000:, 1] = samples[44_999, 1] + share * away + (1.0 - share) * as_before
+    rest = np.tile(samples[44_999] * [0.0, 1.0, 0.0], (round(still / T), 1))
+    return np.concatenate([samples[:45_000], rest, samples[45_000:]])
+
+
+@pytest.mark.parametrize(("still", "alarms"), [(20.0, True), (70.0, False)])
+def test_what_has_changed_during_a_long_pause_is_learnt_again(still: float, alarms: bool) -> None:
+    """Before, oil that cooled while the machine stood raised an alarm in every second pause."""
+    watch = Watch(P, T, pressure=False, learning=60.0)
+    watch._clock[RESTARTED] = -1e6  # as if it had run for long
+    events = watch.take(_after_a_stop(still, 0.06))
+    assert any(isinstance(event, Alarm) for event in events) == alarms
 
 
 def test_an_interrupted_stream_must_be_learnt_again(leaking: np.ndarray) -> None:
