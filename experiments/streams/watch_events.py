@@ -1,4 +1,4 @@
-"""Events of a watch, as entries of the JSON contract: start, ready, alarm, change, end."""
+"""Events of a watch, as entries of the JSON contract: start, ready, alarm, change, missing, back, end."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from experiments.command.options import PRESSURE
+from experiments.streams.missing_channels import MissingChannels
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,6 +43,7 @@ class WatchEvents:
         self.began = 0.0
         self.alarms = self.rows = self.gaps = self.left_out = 0
         self._came = time.monotonic()
+        self._missing = MissingChannels()
 
     def start(self, source: str, watch: "Watch", rig: str, false_alarms: float) -> None:
         """Report the start of a stream.
@@ -59,7 +61,7 @@ class WatchEvents:
         said = f"learning the healthy behaviour: alarms are possible after {watch.unlearnt:.0f} s of motion"
         if self._is_armed:
             said = "the healthy behaviour was learnt before"
-        said += f"; without {PRESSURE}" if "motion" in watch.balances else ""
+        said += f"; without {PRESSURE}" if self._is_blind else ""
         self._line("start", self.began, **about, message=said)
         if self._is_armed:
             self._report_ready(self.began, watch.thresholds)
@@ -80,7 +82,7 @@ class WatchEvents:
         self._line("alive", time_s, **taken, silent_s=silent, alarms=self.alarms, message="alive")
 
     def process_samples(self, channels: "Mapping[str, NDArray[np.float64]]", last: float, gap: bool) -> None:
-        """Process samples that the watch has taken: count them and the gaps before them.
+        """Process samples that the watch has taken: count them and the gaps before them, and tell missing channels.
 
         Parameters
         ----------
@@ -91,10 +93,28 @@ class WatchEvents:
         gap : bool
             Whether rows are missing before the samples.
         """
-        del last
+        judged = {name: channels[name] for name in self._judged(channels)}
+        for name, since, missing in self._missing.process(judged, last, gap):
+            said = f"samples of {name} are missing since {since:.1f} s of the stream, so no alarm is possible"
+            if not missing:
+                said = f"{name} is back; it was missing from {since:.1f} s of the stream"
+            self._line("missing" if missing else "back", last, channel=name, since_s=_rounded(since), message=said)
         self.gaps += gap
         self.rows += max((len(values) for values in channels.values()), default=0)
         self._came = time.monotonic()
+
+    @property
+    def _is_blind(self) -> bool:
+        """Whether pressure is not watched."""
+        return self.watch is not None and "motion" in self.watch.balances
+
+    def _judged(self, channels: "Mapping[str, NDArray[np.float64]]") -> list[str]:
+        """Return the channels without which nothing is judged."""
+        from plant.log.chamber_pressures import CHAMBERS
+
+        pressures = () if self._is_blind else (PRESSURE,) if PRESSURE in channels else CHAMBERS
+        motion = "position_m" if "position_m" in channels else "velocity_m_s"
+        return [name for name in ("motor_speed_rad_s", motion, *pressures) if name in channels]
 
     def nearness(self) -> dict[str, Any]:
         """Return how near each balance is to an alarm.
@@ -120,7 +140,7 @@ class WatchEvents:
                 self._report_ready(event.time, event.thresholds)
             elif isinstance(event, Alarm):
                 self.alarms += 1
-                self._line("alarm", event.time, **_alarm(event), message=_alarm_message(event))
+                self._line("alarm", event.time, **_alarm(event), message=_alarm_message(event, self._is_blind))
             else:
                 lost = dict(zip(("before", "after"), event.lost or (None, None), strict=True))
                 about = {
@@ -168,12 +188,16 @@ def _alarm(alarm: "Alarm") -> dict[str, Any]:
     }
 
 
-def _alarm_message(event: "Alarm") -> str:
+def _alarm_message(event: "Alarm", blind: bool) -> str:
     from faults.watch.events import LOSS_BALANCE
 
     first, last = event.interval
     if event.balance == LOSS_BALANCE:
         when = f"since about {event.since:.0f} s of the stream (95 % interval {first:.0f} to {last:.0f} s)"
+        if blind:
+            return (
+                f"more speed is lost than warm oil explains, {when}: by a leak, growing friction or a failing encoder"
+            )
         return f"leakage has grown by more than warm oil explains, {when}"
     when = f"{event.since:.2f} s of the stream (95 % interval {first:.2f} to {last:.2f} s)"
     return f"the {event.balance} balance changed at {when}: {BALANCES[event.balance]}"
@@ -181,7 +205,7 @@ def _alarm_message(event: "Alarm") -> str:
 
 def _reading(event: "Change") -> str:
     if event.lost is None or event.pressure is None:
-        return f"without {PRESSURE} the cause of the change is not known"
+        return f"without {PRESSURE} the cause of the change is not known: a leak, friction, a load or a failing sensor"
     before, after = (f"{100.0 * one:.0f} %" for one in event.lost)
     return (
         f"flow lost: {before} of the pump's delivery before, {after} after; "

@@ -76,10 +76,10 @@ def watch(
     """Report a change inside the actuator as it happens: one JSON object per line.
 
     Events: start; ready (learning is over); alarm, with since_s and its 95 % interval; change (two seconds later: how
-    much lost flow and pressure changed); alive (with --heartbeat); end. Each has the time of the stream and the clock's
-    time (UTC). The command learns how the healthy actuator behaves and follows slow drift, such as warming oil. So it
-    reports sudden changes, and leakage that grows by more than warm oil explains. Use diagnose for a fault that was
-    there from the start.
+    much lost flow and pressure changed); missing and back (a channel has no samples); alive (with --heartbeat); end.
+    Each has the time of the stream and the clock's time (UTC). The command learns how the healthy actuator behaves and
+    follows slow drift, such as warming oil. So it reports sudden changes, and leakage that grows by more than warm oil
+    explains. Use diagnose for a fault that was there from the start.
     """
     require_positive("--heartbeat", heartbeat, "s")
     require_place("--state", state)
