@@ -346,5 +346,5 @@ def watch_record(
         If a channel is missing, or a rate or time is not usable.
     """
     samples, pressure = watched_samples({name: record[name] for name in record}, record.sample_time)
-    options = {"pressure": pressure, "false_alarms": false_alarms, "learning": learning, "start": record.start_time}
-    return Watch(parameters, record.sample_time, **options).take(samples)
+    options = {"false_alarms": false_alarms, "learning": learning, "start": record.start_time}
+    return Watch(parameters, record.sample_time, pressure=pressure, **options).take(samples)

@@ -3,7 +3,7 @@ import pytest
 
 from faults.watch.events import Alarm, Change, Ready
 from faults.watch.kernel import watch_kernel
-from faults.watch.memory import RESTARTED
+from faults.watch.memory import RESTARTED, Memory
 from faults.watch.watch import Watch, watch_record
 from plant.eha.model import EhaParameters
 from plant.errors import HydrostateError
@@ -118,7 +118,9 @@ def _after_a_stop(still: float, lost: float, seed: int = 11) -> np.ndarray:
 def test_what_has_changed_during_a_long_pause_is_learnt_again(still: float, alarms: bool) -> None:
     """Before, oil that cooled while the machine stood raised an alarm in every second pause."""
     watch = Watch(P, T, pressure=False, learning=60.0)
-    watch._clock[RESTARTED] = -1e6  # as if it had run for long
+    kept = watch.remembered()
+    kept[f"memory_{Memory._fields.index('clock')}"][RESTARTED] = -1e6  # as if it had run for long
+    watch.resume(kept)
     events = watch.take(_after_a_stop(still, 0.06))
     assert any(isinstance(event, Alarm) for event in events) == alarms
 
