@@ -65,3 +65,19 @@ def test_other_records_are_of_the_same_machine(monkeypatch: pytest.MonkeyPatch) 
     own = gain(one.tests[""])
     assert gain((u, y)) == pytest.approx(own, rel=0.3)
     assert gain((v, z)) == pytest.approx(own, rel=0.3)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_no_machine_answers_inputs_that_are_still_to_come(name: str) -> None:
+    _, make = MACHINES[name]
+    u = np.random.default_rng(2).uniform(-1.0, 1.0, 60)
+    whole, half = (make(part, np.random.default_rng(1)) for part in (u, u[:30]))
+    for output, y in half.items():
+        assert np.array_equal(y, whole[output][:30])
+
+
+def test_speeds_have_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MACHINES", {"damper": MACHINES["damper"]})
+    for seed in (1, 2):
+        one = stand_in_sets(seed)[0]
+        assert np.concatenate([one.train[0], one.tests[""][0]]).mean() == pytest.approx(0.0, abs=1e-12)
