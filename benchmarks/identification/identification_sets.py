@@ -11,7 +11,8 @@ stand in for held-back data. How often the default loses to the better baseline 
 estimates initial states from only the first fifth of the test: a model with an unstable pole and a state fitted to the
 whole test follows the output without its inputs. If a peer's state grows a hundredfold over the test, its error is
 shown but not compared. If a peer is ahead by more than the targets allow, the ratio of errors is printed with its 95 %
-interval over resampled blocks of the test. ``--again 16`` makes that many other records of each stand-in, and reports
+interval over resampled blocks of the test; the last lines count these leads, and how many there would be if ours and
+the best peer were equally good. ``--again 16`` makes that many other records of each stand-in, and reports
 whether the default is worse there than ``first``, and ``auto`` worse than the default: one test of a nonlinear machine
 decides little.
 """
@@ -36,7 +37,7 @@ from benchmarks.identification.identification_sets_data import DATA, Part, Publi
 from benchmarks.identification.identification_simulated import simulated_sets
 from benchmarks.identification.identification_stand_ins import stand_in_sets
 from benchmarks.identification.other_records import WORSE_RATIO, OtherRecords
-from benchmarks.identification.paired_blocks import error_ratio
+from benchmarks.identification.peer_leads import PeerLeads
 from estimation.arrays import Array
 from estimation.identification.free_run.data import channels_from
 from estimation.identification.free_run.identify import identify_channels
@@ -62,9 +63,6 @@ MOST_PEER_SAMPLES = 10_000
 
 LOSING_RATIO = 1.05
 """Ratio to the better baseline's error from which the default counts as losing."""
-
-PEER_LIMITS = {"default": (("sippy", "jax-sysid"), 1.02), "nonlinear": (("sysidentpy", "jax-sysid-nonlinear"), 1.10)}
-"""Peers that the default, and our best possibly nonlinear model, are compared with, and the allowed error ratio."""
 
 LOOKAHEAD_GROWTH = 100.0
 """Growth of a peer's state over the test from which its start encodes outputs instead of inputs."""
@@ -99,7 +97,7 @@ def main(arguments: list[str]) -> int:
     names = ("first", "scipy", *options.ours, *peers)
     wide = {name: max(11, len(name)) for name in names}
     print(f"{'set':28s}" + "".join(f" {name:>{wide[name]}s}" for name in names) + "   seconds of ours")
-    missed, ratios, others = 0, list[float](), OtherRecords()
+    missed, ratios, others, leads = 0, list[float](), OtherRecords(), PeerLeads()
     for one in chosen:
         with threadpool_limits(1), warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -113,7 +111,8 @@ def main(arguments: list[str]) -> int:
             rmse = auto * float(np.std(part[1]))
             if title in PUBLISHED and rmse > 0.0:
                 print(f"{'':28s}auto {rmse:.4g} = {20.0 * np.log10(rmse):.1f} dB; published: {PUBLISHED[title]}")
-            for line in _peers_ahead(one, test, {name: run for name, run in runs.items() if name not in ahead}):
+            shared = {name: run[test][one.skipped :] for name, run in runs.items() if test in run and name not in ahead}
+            for line in leads.lines(part[1][one.skipped :], shared):
                 print(f"{'':28s}{line}")
             for line in others.comparison_lines(one, runs):
                 print(f"{'':28s}{line}")
@@ -123,7 +122,7 @@ def main(arguments: list[str]) -> int:
     lost, mean = sum(one > LOSING_RATIO for one in ratios), float(np.exp(np.mean(np.log(ratios))))
     print(f"default over the better of first and scipy: {lost} of {len(ratios)} lose more than 5 %,", end=" ")
     print(f"worst {max(ratios):.2f}-fold, geometric mean {mean:.3f}")
-    for line in others.summary():
+    for line in [*leads.summary(), *others.summary()]:
         print(line)
     return missed
 
@@ -134,22 +133,6 @@ def _no_set_reason(wanted: list[str]) -> str:
     if not known:
         return f"no public set in {DATA}"
     return f"no set's name has {' or '.join(map(repr, wanted))} in it; there are {known}"
-
-
-def _peers_ahead(one: PublicSet, test: str, runs: dict[str, dict[str, Array]]) -> list[str]:
-    """Return lines on peers that are ahead of ours by more than allowed, with the confidence from the test."""
-    y = one.tests[test][1][one.skipped :]
-    left = {name: run[test][one.skipped :] - y for name, run in runs.items() if test in run}
-    errors = {name: float(np.sqrt(np.mean(value**2))) for name, value in left.items() if np.isfinite(value).all()}
-    lines: list[str] = []
-    for kind, (peers, allowed) in PEER_LIMITS.items():
-        ours = [(errors[name], name) for name in OUR_STRUCTURES if name in errors and kind in (name, "nonlinear")]
-        theirs = [(errors[name], name) for name in peers if name in errors]
-        if ours and theirs and min(ours)[0] > allowed * min(theirs)[0]:
-            own, peer = min(ours)[1], min(theirs)[1]
-            ratio, low, high = error_ratio(left[own], left[peer])
-            lines.append(f"{own} over {peer} {ratio:.2f}, 95 % interval {low:.2f} to {high:.2f}")
-    return lines
 
 
 def _peer_folder() -> Path:

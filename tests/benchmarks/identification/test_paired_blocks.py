@@ -1,9 +1,10 @@
 """The interval of a ratio of errors covers the truth for errors correlated in time, and shrinks with longer tests."""
 
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
-from benchmarks.identification.paired_blocks import error_ratio, records_ratio
+from benchmarks.identification.paired_blocks import chance_of_lead, error_ratio, records_ratio
 from estimation.arrays import Array
 
 
@@ -53,3 +54,18 @@ def test_resampled_records_with_different_error_levels_give_nominal_coverage() -
         _, low, high = records_ratio(one, other)
         held += low < 1.0 < high
     assert 0.85 * 200 <= held <= 0.99 * 200
+
+
+def test_equally_good_models_lead_as_often_as_their_scatter_says() -> None:
+    leads, chances = 0, list[float]()
+    for seed in range(300):
+        one, other = errors(1500, seed)
+        ratio, _, _ = error_ratio(one, other)
+        leads += ratio > 1.02
+        chances.append(chance_of_lead(one, 1.5 * other, 1.02))  # a true lead does not count
+    assert leads / 300 == pytest.approx(float(np.mean(chances)), abs=0.08)
+
+
+def test_a_ratio_that_does_not_scatter_is_no_matter_of_chance() -> None:
+    one = errors(1000, 2)[0]
+    assert chance_of_lead(2.0 * one, one, 1.02) == 0.0
