@@ -8,9 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from plant.arrays import Array
-from plant.errors import LogError, NoMemoryError
+from plant.errors import LogError, LogWarning, NoMemoryError
 from plant.log.columns import TRUTH_PREFIX, Column
 from plant.log.headings import Heading
+from plant.log.notes import LogCode
 
 Read: TypeAlias = Callable[[Sequence[Column]], dict[Column, Array]]
 """From columns to their values as logged; a column of the truth that holds no numbers is left out."""
@@ -145,7 +146,12 @@ class Table:
 
 
 def table_of(
-    source: str, named: Mapping[str, Any], *, units: Mapping[str, str | None] | None = None, **more: Any
+    source: str,
+    named: Mapping[str, Any],
+    *,
+    units: Mapping[str, str | None] | None = None,
+    scales: Mapping[str, tuple[float, float]] | None = None,
+    **more: Any,
 ) -> Table:
     """Return a table of columns in memory, or of columns that are read on request.
 
@@ -155,6 +161,8 @@ def table_of(
         Values by name, or what reads them.
     units : Mapping[str, str or None], optional
         Unit by name, where the file gives it.
+    scales : Mapping[str, tuple[float, float]], optional
+        Factor and offset by name that the file states, without saying whether its values are scaled already.
     **more
         As `Table` takes them.
     """
@@ -164,6 +172,10 @@ def table_of(
     names = list(named)
 
     def read_one(column: Column) -> Array:
+        told = (scales or {}).get(names[column.position])
+        if told is not None and not column.channel.startswith(TRUTH_PREFIX):
+            note = LogCode.SCALE_IN_HEADER.note(factor=told[0], offset=told[1], column=column.name[:80])
+            warnings.warn(LogWarning(note, source), stacklevel=2)
         values = named[names[column.position]]
         got = np.atleast_1d(np.asarray(values() if callable(values) else values))
         return universal_times(got, column.name, source) if is_time(got) else numbers(got, column.name, source)

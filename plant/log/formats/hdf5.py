@@ -24,6 +24,10 @@ NAME_ATTRIBUTES = ("columns", "names", "column_names", "channels")
 PACKING_ATTRIBUTES = ("_FillValue", "missing_value", "scale_factor", "add_offset")
 """How netCDF says that numbers are packed: what stands for none, and what they are multiplied by and added to."""
 
+SCALE_ATTRIBUTES = ("scale", "scaling", "factor", "slope", "multiplier", "gain", "conversion", "resolution", "lsb")
+OFFSET_ATTRIBUTES = ("offset", "intercept")
+"""How programs state the scale of counts, in lower case; none of them says whether it is applied already."""
+
 IN_OTHER_FILES = (
     "its numbers are stored in other files (as virtual or external data sets), which are not read; copy them into it"
 )
@@ -50,6 +54,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
     most = left = most_unpacked(path.stat().st_size)
     groups: dict[str, dict[str, Any]] = defaultdict(dict)
     units: dict[str, dict[str, str | None]] = defaultdict(dict)
+    scales: dict[str, dict[str, tuple[float, float]]] = defaultdict(dict)
     texts: dict[str, str] = {}
     elsewhere = False
     with h5py.File(path, "r") as file:
@@ -73,6 +78,8 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
                 raise too_large(str(path), most)
             for column, values in _columns(one, leaf).items():
                 groups[group][column] = values
+                if (scale := _stated_scale(one)) is not None:
+                    scales[group][column] = scale
                 said = next((said for key in UNIT_ATTRIBUTES if (said := _attribute(one, key))), None)
                 units[group][column] = said.split(" since ")[0] if said else None  # netCDF clocks: "s since 1970"
     if STRUCT in groups and STRUCT in texts:
@@ -82,7 +89,7 @@ def open_hdf5(path: Path) -> tuple[Table, ...]:
             raise LogError(IN_OTHER_FILES, str(path))
         raise LogError(NO_VECTORS if path.suffix.lower() == ".mat" else "it holds no vector of numbers", str(path))
     return tuple(
-        table_of(str(path), columns, units=units[group], metadata=texts.get(group), label=group)
+        table_of(str(path), columns, units=units[group], scales=scales[group], metadata=texts.get(group), label=group)
         for group, columns in groups.items()
     )
 
@@ -138,6 +145,18 @@ def _with_netcdf_scaling(one: Any, values: Any) -> Any:
         told[PACKING_ATTRIBUTES[3]] or 0.0,
     )
     return np.where(np.isin(values, missing), np.nan, scale * values.astype(float) + offset)
+
+
+def _stated_scale(one: Any) -> tuple[float, float] | None:
+    """Return factor and offset that attributes of whole numbers state; None if they state none, or none but 1 and 0."""
+    if one.dtype.kind not in "iu":
+        return None
+    names = {name.lower(): name for name in one.attrs}
+    found = [
+        next((said for key in keys if key in names and (said := _number(one, names[key])) is not None), neutral)
+        for keys, neutral in ((SCALE_ATTRIBUTES, 1.0), (OFFSET_ATTRIBUTES, 0.0))
+    ]
+    return None if found == [1.0, 0.0] else (found[0], found[1])
 
 
 def _number(one: Any, name: str) -> float | None:

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.errors import LogError
+from plant.errors import LogError, LogWarning
+from plant.log.files import read_record
 from plant.log.formats.hdf5 import open_hdf5
 
 h5py = pytest.importorskip("h5py")
@@ -57,3 +58,18 @@ def test_fields_that_hold_several_numbers_are_columns(tmp_path: Path) -> None:
     (table,) = open_hdf5(path)
     assert [one.name for one in table.headings] == ["index", "values 1", "values 2"]
     assert set(table.numbers()[2]) == {7.0}
+
+
+@pytest.mark.parametrize("name", ["scale", "Gain", "slope", "lsb"])
+def test_a_scale_of_counts_is_told_and_not_applied(name: str, tmp_path: Path) -> None:
+    rows = np.arange(20)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["time_s"], file["motor_speed_rad_s"] = 1e-3 * rows, rows.astype(float)
+        file["position_mm"] = rows
+        file["position_mm"].attrs.update({name: 0.5, "offset": 2})
+        file["velocity_mm_s"] = rows.astype(float)
+        file["velocity_mm_s"].attrs[name] = 0.5  # numbers that are no counts
+    with pytest.warns(LogWarning, match="scale factor 0.5 and the offset 2 for column 'position_mm'") as said:
+        record = read_record(tmp_path / "log.h5")
+    np.testing.assert_array_equal(record["position_m"], 1e-3 * rows)
+    assert not any("velocity_mm_s'" in str(one.message) for one in said)
