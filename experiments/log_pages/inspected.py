@@ -21,7 +21,7 @@ BLANK: Result = dict.fromkeys(("plant", "tables", "columns", "options", "reads")
 SPARKLINE_WIDTH = 24
 """Width of a plot on the terminal [characters]."""
 
-GUESSED_UNIT_COMMENT = "  # the file gives no unit: check this one"
+GUESSED_UNIT_COMMENT = "  # the file gives no known unit: check this one"
 """Comment after a guessed unit in a rig file."""
 
 

@@ -107,7 +107,7 @@ def _screen(results: Sequence[Result]) -> "Iterable[RenderableType]":
             else "no column was recognised; name the columns yourself"
         )
         if named := guessed_units(result["tables"]):
-            yield visible(f"check the unit of {', '.join(name for _, name in named)}: the file gives none")
+            yield visible(f"check the unit of {', '.join(name for _, name in named)}: the file gives no known one")
         yield ""
         if result["options"]:
             yield visible(f"or add to one command: {result['options']}")

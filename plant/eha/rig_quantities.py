@@ -7,7 +7,7 @@ from plant.errors import RigError
 from plant.log.formats.cell_texts import NUMBER, split_unit
 from plant.log.formats.cells import number
 from plant.small_file import entry_text
-from plant.unit_text import GAUGE
+from plant.unit_text import pressure_reference
 from plant.units import conversion_to
 
 NUMBER_ADVICE = "write a decimal point, and nothing between thousands"
@@ -62,9 +62,12 @@ def _in_si(name: str, value: Any, unit: str) -> Any:
         factor, offset = conversion_to(given, unit)
     except ValueError as error:
         raise RigError(f"{wrong}: {error}") from error
-    if given in GAUGE:  # some parameters are absolute pressures
-        raise RigError(
-            f"parameters.{name} must be in {GAUGE[given]} or {unit}, got {entry_text(value)}, a pressure above the "
-            "atmosphere: add 1.013 bar if the parameter is absolute"
+    plain, counted_from = pressure_reference(given)
+    if counted_from:  # some parameters are absolute pressures, others are differences
+        remedy = (
+            "a pressure above the atmosphere: add 1.013 bar if the parameter is absolute"
+            if counted_from == "gauge"
+            else "an absolute pressure: take off 1.013 bar unless the parameter is absolute"
         )
+        raise RigError(f"parameters.{name} must be in {plain} or {unit}, got {entry_text(value)}, {remedy}")
     return amount * factor + offset

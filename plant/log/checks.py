@@ -7,6 +7,7 @@ import numpy as np
 from plant.arrays import Array
 from plant.errors import LogError, NoChannelError, SparseLogError
 from plant.log.chamber_pressures import CHAMBERS, PRESSURE, has_pressure_difference, with_pressure_difference
+from plant.log.clock.order import in_order
 from plant.log.clock.uniform import FEWEST_SAMPLES, MOST_MISSING, Channels, CheckedLog, long_enough, on_uniform_clock
 from plant.log.clock.uniform import Clock as Clock
 from plant.log.columns import TIME, TRUTH_PREFIX
@@ -70,7 +71,7 @@ def checked_log(
         _require_channels(complete, [TIME, *required], source)
         long_enough(complete, source)
         _finite(complete, source)
-        timed = _rows_with_time(complete, source, notes)
+        timed = in_order(_rows_with_time(complete, source, notes), notes)
         on_clock = on_uniform_clock(timed, source, clock, notes, most_missing)
         first, whole = _logged_together(on_clock, notes, most_missing)
         channels = _without_sparse_channels(whole, required, source, notes, most_missing)

@@ -9,7 +9,7 @@ import numpy as np
 from plant.errors import NoChannelError
 from plant.log.chamber_pressures import CHAMBERS, PRESSURE, has_pressure_difference
 from plant.log.columns import CHANNELS, TIME, UNITS, list_in_words, unit_ending
-from plant.log.headings import Heading, is_misspelt
+from plant.log.headings import Heading, hides_unit, is_misspelt, timeless_hint
 from plant.log.notes import LogCode
 from plant.log.scale import measures
 from plant.notes import Note
@@ -162,10 +162,10 @@ def unit_of(heading: Heading) -> str | None:
 
     Examples
     --------
-    >>> [unit_of(Heading(one)) for one in ("POS_MM", "V_KOLBEN_MM_S", "DP_MPA", "p_A")]
-    ['mm', 'mm/s', 'MPa', None]
+    >>> [unit_of(Heading(one)) for one in ("POS_MM", "V_KOLBEN_MM_S", "DP_MPA", "p_A", "Weg (0.1 mm)")]
+    ['mm', 'mm/s', 'MPa', None, None]
     """
-    if heading.unit is not None or heading.stamped:
+    if heading.unit is not None or heading.stamped or hides_unit(heading.name):
         return heading.unit
     found = _SUFFIX.search(heading.stem)
     unit = "" if found is None else found[1].replace("_", "/")
@@ -313,7 +313,7 @@ def hint_of(channels: Sequence[str], headings: Sequence[Heading], more: Sequence
     options = [shown[name] for name in in_usual_order(shown)] if set(shown) & set(channels) else []
     may = f"; perhaps --columns '{','.join(options)}'" if options else ""
     put = ", with the unit of each for UNIT" if any(one.endswith(":UNIT") for one in options) else ""
-    timeless = "; to read a log without time, give --sample-time" if TIME in channels and TIME not in shown else ""
+    timeless = timeless_hint(headings) if TIME in channels and TIME not in shown else ""
     # one of the columns in V is probably the drive
     volts = not options and sum(one.unit is not None and measures(one.unit, "V") for one in headings) > 1
     scale = (

@@ -78,7 +78,26 @@ def is_misspelt(stem: str, meant: str) -> bool:
     )
 
 
+_WIDE = str.maketrans("\uff08\uff09\uff3b\uff3d", "()[]")
+"""Brackets as wide as the letters of Chinese and Japanese."""
+
+
+_BEHIND_FACTOR = re.compile(r"(?:\d[.,]\d+|[/x*^\u00d7]\s?-?\d+|\d[eE]-?\d+)[\s_]*[^\W\d_]+(?:/\w+)?\W*$")
+
+
+def hides_unit(name: str) -> bool:
+    """Return whether the last word of a name is not its unit: it stands in brackets, or behind a fraction or a factor.
+
+    Examples
+    --------
+    >>> [hides_unit(name) for name in ("Position (0.1 mm)", "Position 1/100 mm", "Position mm", "Pressure 1 bar")]
+    [True, True, False, False]
+    """
+    return _BRACKETED.match(name.translate(_WIDE)) is not None or _BEHIND_FACTOR.search(name) is not None
+
+
 def _split_unit(name: str) -> tuple[str, str | None]:
+    name = name.translate(_WIDE)
     if (found := _BRACKETED.match(name)) and not _INDEX.fullmatch(found["square"] or ""):
         inside = found["square"] if found["square"] is not None else found["round"]
         if found["square"] is not None or is_unit(inside):
@@ -114,8 +133,8 @@ _SCALED = frozenset(("m", "s", "A", "V", "N", "g", "J", "W", "Pa", "Hz", "rad", 
 _KNOWN = _SCALED | frozenset(
     (
         *("rpm", "rev", "turn", "revolution", "min", "sec", "msec", "usec", "h", "d", "hour", "minute", "day"),
-        *("psi", "kgf", "lbf", "atm", "torr", "mmHg", "pascal", "in", "inch", "ft", "mils", "meter"),
-        *("km", "cm", "mm", "um", "µm", "nm"),
+        *("psi", "ksi", "kgf", "lbf", "atm", "torr", "mmHg", "pascal", "in", "inch", "ft", "thou", "meter"),
+        *("km", "dm", "cm", "mm", "um", "µm", "nm", "krpm", "rps", "kph", "mph", "mps"),
         *("metre", "deg", "degree", "radian", "°", "degC", "degF", "°C", "°F", "K", "kelvin", "volt", "newton"),
         *("second", "lpm", "%"),
     )
@@ -132,6 +151,40 @@ def headings_of(names: Sequence["str | Heading"]) -> list[Heading]:
     """
     given = [one if isinstance(one, Heading) else Heading(one) for one in names]
     return [replace(one, name=one.name.strip().removeprefix("\ufeff").strip()) for one in given]
+
+
+_CALLED_TIME = re.compile(r"(^|_)(t|time|zeit)(_|$)")
+
+
+def timeless_hint(headings: Sequence[Heading]) -> str:
+    """Return what to do about a log of which no column is surely the time.
+
+    Parameters
+    ----------
+    headings : sequence of Heading
+        Of all its columns. Where several hold times, rows that are taken as evenly spaced would mix their channels.
+
+    Examples
+    --------
+    >>> timeless_hint([Heading("a"), Heading("b")])
+    '; to read a log without time, give --sample-time'
+    >>> timeless_hint([Heading("t_a [s]"), Heading("a"), Heading("t_b [s]"), Heading("b")])[:33]
+    "; 't_a [s]' and 't_b [s]' are bot"
+    """
+    timed = [
+        one
+        for one in headings
+        if one.stamped or (converts(one.unit, "s") if one.unit else _CALLED_TIME.search(one.stem) is not None)
+    ]
+    if len(timed) < 2:
+        return "; to read a log without time, give --sample-time"
+    first, second = (one.name[:40] for one in timed[:2])
+    unit = "" if timed[0].stamped else f":{timed[0].unit or 'UNIT'}"
+    return (
+        f"; {first!r} and {second!r} are both times: if all channels were taken at the first, --columns "
+        f"'time_s={first}{unit}'; else save each channel with its own time, called time_s, as a file of its own, and "
+        "add the others by --with FILE"
+    )
 
 
 def is_unit_row(row: Sequence[str]) -> bool:

@@ -144,6 +144,8 @@ def clock_facts(stamps: Any) -> ClockFacts | None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
         step = np.diff(time)
+        if stamps.dtype.kind == "M" and (step < 0.0).all():  # the newest row stands first
+            time, step = time[::-1], -step[::-1]
         forward, span = step[step > 0.0], float(time[-1] - time[0])
         if not len(forward) or not np.isfinite(forward).all() or not np.isfinite(span):
             return None

@@ -73,6 +73,11 @@ class LogCode(Code):
         "{channel} falls back by {span_s:.10g} s, like a counter that overflows (places: {count}, the first at row "
         "{row}); the rows were read as one log"
     )
+    ROWS_NEWEST_FIRST = "rows stand with the newest first; they were read from the last to the first"
+    ROWS_SORTED = (
+        "rows do not stand in the order of time (places: {count}, the first at row {row}); they were sorted by it, "
+        "which makes all steps even"
+    )
     END_LEFT_OUT = "the lines after row {taken}, the last row of data, were left out (lines: {count})"
     COLUMNS_ABSENT = "the rig file names columns that the log does not have: {columns}; it was read without them"
     COLUMN_OVERLOOKED = (

@@ -9,8 +9,10 @@ import numpy as np
 
 from plant.arrays import Array
 from plant.errors import LogError, MissingColumnError, TextColumnError
+from plant.log.chamber_pressures import require_one_reference
 from plant.log.checks import alternatives, missing_required
 from plant.log.clock.merging import LoggerChannels, merge_loggers
+from plant.log.clock.order import oldest_first
 from plant.log.clock.stamps import seconds_from_first
 from plant.log.clock.time_unit import likely_unit, unit_of_dates
 from plant.log.columns import TIME, TRUTH_PREFIX, Column, list_in_words, resolve_columns
@@ -96,13 +98,26 @@ def gather_channels(
             raise LogError("a log needs rows of numbers below its header line, this file has none", source)
         wanted = [TIME] * timeless + missing
         raise missing_channels(wanted, headings, source, found)
+    require_one_reference(*_units_and_names(chosen, mapping or {}), source)
     with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused or noted later
         notes: list[Note] = []
         parts = [(table, _without_text(table, columns, found, required, notes)) for table, columns in chosen]
     timed = [_with_time(table, values, parts, sample_time, source) for table, values in parts]
     together = merge_loggers(timed, source)
-    columns, began = _seconds_from_start(together.channels)
+    columns, began = _seconds_from_start(oldest_first(together.channels, notes))
     return LogTables(columns, began, (*_unused_column_notes(chosen, tables), *notes, *together.notes))
+
+
+def _units_and_names(
+    chosen: Sequence[tuple[Table, Sequence[Column]]], mapping: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return unit and name of each channel's column; the unit that the user gives is the one that counts."""
+    units: dict[str, str] = {}
+    for table, columns in chosen:
+        for column in columns:
+            _, colon, given = mapping.get(column.channel, "").rpartition(":")
+            units[column.channel] = given if colon else table.headings[column.position].unit or ""
+    return units, {column.channel: column.name for _, columns in chosen for column in columns}
 
 
 def _time_without_unit(tables: Sequence[Table]) -> tuple[int, Heading, tuple[str, str] | None] | None:

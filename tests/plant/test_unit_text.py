@@ -5,6 +5,7 @@ import pytest
 
 from plant.errors import LogError, RigError
 from plant.log.columns import parse_columns, resolve_columns
+from plant.log.headings import Heading
 from plant.unit_text import plain_unit
 from plant.units import conversion_to
 
@@ -63,3 +64,41 @@ def test_units_of_benches_are_converted_to_the_spelling_of_the_library(unit: str
 )
 def test_spellings_of_benches_mean_a_unit(spelling: str, unit: str) -> None:
     assert plain_unit(spelling) == unit
+
+
+@pytest.mark.parametrize(
+    ("spelling", "wanted", "factor"),
+    [
+        ("Inches", "m", 0.0254),
+        ("IN.", "m", 0.0254),
+        ("mil", "m", 2.54e-5),
+        ("feet", "m", 0.3048),
+        ("microns", "m", 1e-6),
+        ("Millimeter", "m", 1e-3),
+        ("ips", "m/s", 0.0254),
+        ("fpm", "m/s", 0.3048 / 60.0),
+        ("KSI", "Pa", 6894757.2931683635),
+        ("PSIG", "Pa", 6894.7572931683635),
+        ("psia", "Pa", 6894.7572931683635),
+        ("bar abs", "Pa", 1e5),
+        ("MPag", "Pa", 1e6),
+        ("mPa", "Pa", 1e-3),
+        ("kp/cm²", "Pa", 98066.5),
+        ("krpm", "rad/s", 1000.0 * math.pi / 30.0),
+        ("rps", "rad/s", 2.0 * math.pi),
+        ("revs/min", "rad/s", math.pi / 30.0),
+        ("об/мин", "rad/s", math.pi / 30.0),  # noqa: RUF001
+        ("МПа", "Pa", 1e6),
+        ("Sek.", "s", 1.0),
+        ("msecs", "s", 1e-3),
+        ("hours", "s", 3600.0),
+    ],
+)
+def test_what_workshops_call_a_unit_is_read_in_brackets_as_well(spelling: str, wanted: str, factor: float) -> None:
+    assert conversion_to(spelling, wanted) == (pytest.approx(factor, rel=1e-12), 0.0)
+    assert Heading(f"x ({spelling})").unit == spelling
+
+
+@pytest.mark.parametrize("word", ["actual", "CH1", "filtered", "Min", "abs", "a", "0.1 mm", "x10 bar"])
+def test_other_words_in_brackets_are_no_units(word: str) -> None:
+    assert Heading(f"x ({word})").unit is None

@@ -112,7 +112,7 @@ def are_seconds(values: Array) -> bool:
 
 
 def usual_units(values: Array, step: float) -> list[str]:
-    """Return the units among s, ms and us in which a time has a usual step, the likeliest first; s if there is none.
+    """Return the units among s, ms and us in which a time has a usual step, the likeliest first; else the likeliest.
 
     Parameters
     ----------
@@ -126,10 +126,12 @@ def usual_units(values: Array, step: float) -> list[str]:
     >>> times = np.arange(600.0)
     >>> usual_units(0.2 * times, 0.2), usual_units(times, 1.0), usual_units(0.01 * times, 0.01)
     (['s', 'ms'], ['ms'], ['s', 'ms'])
+    >>> usual_units(0.42 + times / 86.4e6, 1.0 / 86.4e6)
+    ['d']
     """
     most = LONGEST_USUAL_STEP * (1.0 + ROUNDING)
     found = [unit for unit, factor in _UNITS[:3] if SAMPLE_TIME_RANGE[0] <= step * factor <= most]
-    return list(dict.fromkeys(["s", *found] if are_seconds(values) else found)) or ["s"]
+    return list(dict.fromkeys(["s", *found] if are_seconds(values) else found)) or [likely_unit(values) or "s"]
 
 
 def _usual_step(values: Array) -> float:

@@ -209,6 +209,12 @@ def _resampled(time: Array, channels: Channels, source: str, notes: list[Note]) 
 
 
 def _not_increasing_error(time: Array, source: str) -> ClockError:
+    if (np.diff(time) < 0.0).all():
+        raise ClockError(
+            f"{TIME} must increase, but falls from row to row; if the newest row stands first, turn the rows round; "
+            "if it counts down, --sample-time S takes the rows as evenly spaced by S seconds",
+            source,
+        )
     row = int(np.argmax(np.diff(time) <= 0.0))
     got = f"{time[row + 1]:.12g} in row {row + 2} after {time[row]:.12g}"
     return ClockError(

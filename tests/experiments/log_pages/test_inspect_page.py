@@ -84,15 +84,15 @@ def test_options_do_not_break_across_lines_and_can_be_copied_together(tmp_path: 
 
 def test_the_page_lists_the_columns_whose_missing_units_must_be_checked(tmp_path: Path) -> None:
     """Before, the page asked the reader to check units "that are marked as guessed", and marked none."""
-    asked = "The file gives no unit for Zeit, Drehzahl, Weg: check"
+    asked = "The file gives no known unit for Zeit, Drehzahl, Weg: check"
     assert asked in page_of(tmp_path, "Zeit,Drehzahl,Weg", TIME, SPEED, WAY)
-    assert "gives no unit" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
+    assert "gives no known unit" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
 
 
 def test_a_guessed_unit_is_marked_in_the_heading_and_in_the_rig_file(tmp_path: Path) -> None:
     page = page_of(tmp_path, "time_s,motor_speed_rad_s,Weg [mm],dP", TIME, SPEED, WAY, 50.0 * SPEED / SPEED.max())
     assert "<h1>This log can be diagnosed; check the units that were guessed.</h1>" in page
-    assert "# the file gives no unit: check this one" in page
+    assert "# the file gives no known unit: check this one" in page
     assert "# the file" not in page_of(tmp_path, "time_s,motor_speed_rad_s,position_m", TIME, SPEED, WAY)
 
 

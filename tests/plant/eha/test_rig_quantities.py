@@ -45,6 +45,8 @@ def test_two_sides_may_differ_in_their_units(tmp_path: Path) -> None:
         ('relief_pressure = "160 furlong"', "got '160 furlong': unit 'furlong' does not convert"),
         ('relief_pressure = "160 9**9**9"', "a number and its unit in quotes, got"),
         ('accumulator_pressure = "2 barg"', "got '2 barg', a pressure above the atmosphere: add 1.013 bar"),
+        ('accumulator_pressure = "2 BAR G"', "got '2 BAR G', a pressure above the atmosphere: add 1.013 bar"),
+        ('relief_pressure = "500 psia"', "got '500 psia', an absolute pressure: take off 1.013 bar unless"),
         ('relief_pressure = "bar"', "must be a number in Pa, or a number and its unit in quotes, got 'bar'"),
         ('moving_mass = "30"', "must be a number in kg, or a number and its unit in quotes, got '30'"),
         ('bulk_modulus = "1.4e9"', "must be a number in Pa, or a number and its unit in quotes, got '1.4e9'"),

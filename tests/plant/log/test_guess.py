@@ -147,3 +147,21 @@ def test_a_column_recognised_as_pressure_only_by_its_unit_is_not_suggested(tmp_p
         read_record(path)
     assert "position_m=Weg [mm]:mm" in str(told.value)
     assert "pressure" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["Position (0.1 mm)", "Position (1/100 mm)", "Position 0.01 mm", "Position\uff080.1 mm\uff09"]
+)
+def test_a_scale_is_not_read_as_the_unit_behind_it(name: str) -> None:
+    (guess,) = guess_by_name([Heading(name)], ["position_m"])
+    assert guess.unit is None
+    assert f"position_m={name}:UNIT" in hint_of(["position_m"], [Heading(name)])
+
+
+def test_of_several_times_none_is_replaced_by_evenly_spaced_rows() -> None:
+    headings = [Heading(one) for one in ("Time n [s]", "n [rpm]", "Time x [s]", "x [mm]")]
+    hint = hint_of(["time_s"], headings)
+    assert "--columns 'time_s=Time n [s]:s'" in hint
+    assert "--with FILE" in hint
+    assert "--sample-time" not in hint
+    assert "--sample-time" in hint_of(["time_s"], headings[1::2])

@@ -36,3 +36,9 @@ def test_a_time_without_a_usual_step_is_in_seconds() -> None:
     assert usual_units(np.zeros(5), 0.0) == ["s"]
     assert usual_units(np.arange(60_000.0) / 5.0, 0.2) == ["ms"]
     assert likely_unit(np.zeros(5)) is None
+
+
+def test_a_time_of_day_as_a_fraction_of_it_is_in_days() -> None:
+    rows = np.arange(600.0)
+    assert usual_units(0.4271 + rows / 86.4e6, 1.0 / 86.4e6) == ["d"]
+    assert usual_units(rows, 0.0) == ["ms"]
