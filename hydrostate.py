@@ -202,7 +202,7 @@ def read(
     with options_by_name():
         kind = actuator(plant or DEFAULT)
     bench = _rig(rig, kind)
-    if not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
+    if isinstance(sample_time, bool) or not isinstance(sample_time, Real | None):  # pyright: ignore[reportUnnecessaryIsInstance] -- a user's slip
         refuse(f"sample_time must be a number of seconds, got {sample_time!r}")
     if isinstance(path, PathLike | bytes):
         path = Path(fsdecode(path))

@@ -136,6 +136,10 @@ MISTAKES: dict[str, tuple[Callable[[hs.Log, Path], object], str]] = {
     "misspelt condition": (lambda log, file: hs.simulate("minor_leak"), "condition must be one of normal"),
     "misspelt plant": (lambda log, file: hs.simulate(plant="pump"), "plant must be one of eha, reduced, lumped"),
     "plant of none": (lambda log, file: hs.read(file, plant="pump"), "plant must be one of eha, reduced, lumped"),
+    "a truth for a time": (
+        lambda log, file: hs.read(file, sample_time=True),
+        "sample_time must be a number of seconds",
+    ),
     "text for a time": (lambda log, file: hs.read(file, sample_time="1 ms"), "sample_time must be a number of seconds"),  # type: ignore[arg-type]
     "text for a count": (lambda log, file: log.identify(n_denominator="3"), "n_denominator must be a number, got '3'"),
     "no whole order": (

@@ -96,10 +96,11 @@ def choose_model(
         If a structure is not known, or as the fits.
     """
     unknown = [name for name in structures if name not in _FITS]
-    if unknown or not structures or not orders:
-        raise HydrostateError(
-            f"structures must be among {', '.join(_FITS)}, and an order given, got {unknown}, {orders}"
-        )
+    if unknown or not structures:
+        got = ", ".join(map(repr, unknown)) or "none"
+        raise HydrostateError(f"structures must be among {', '.join(_FITS)}, got {got}")
+    if not orders:
+        raise HydrostateError("orders must be one whole number or more, got none")
     inputs, outputs = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
     lag = estimate_delay(inputs, outputs) if delay is None else delay
     order, table, compared = orders[0], None, None

@@ -1,5 +1,6 @@
 """Tables in memory, read as a log: of pandas, Polars or Arrow, or columns by name."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeGuard
 
@@ -78,7 +79,8 @@ def frame_table(given: "pd.DataFrame | Mapping[str, Any]") -> Table:
     """
     names = [_text(name) for name in (given.columns if is_frame(given) else given)]
     if len(set(names)) < len(names):
-        raise LogError(f"columns of different names are needed, got {', '.join(names)}", SOURCE)
+        twice = ", ".join(repr(name) for name, count in Counter(names).items() if count > 1)
+        raise LogError(f"columns of different names are needed, got {twice} more than once", SOURCE)
     values: dict[str, Any] = dict(zip(names, _columns(given, names), strict=True))
     values = {name: one for name, one in values.items() if not (name.startswith("__") and name.endswith("__"))}
     units: dict[str, str | None] = {}

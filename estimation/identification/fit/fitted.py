@@ -70,11 +70,14 @@ class Task:
         """
         form = self.form
         n_b, n_f = form.n_numerator, form.n_denominator
-        if min(n_b, n_f) < 1 or min(form.delay, self.n_c, self.n_d) < 0:
-            raise HydrostateError(
-                "n_numerator and n_denominator must be at least 1, delay, n_c and n_d at least 0, "
-                f"got {n_b}, {n_f}, {form.delay}, {self.n_c} and {self.n_d}"
-            )
+        positive, others = (
+            {"n_numerator": n_b, "n_denominator": n_f},
+            {"delay": form.delay, "n_c": self.n_c, "n_d": self.n_d},
+        )
+        for least, sizes in ((1, positive), (0, others)):
+            for name, size in sizes.items():
+                if size < least:
+                    raise HydrostateError(f"{name} must be at least {least}, got {size}")
         n_wanted = SAMPLES_PER_PARAMETER * (form.n_parameters + self.n_c + self.n_d)
         return experiments_from(u, y, self.names, n_excited=form.n_main, n_wanted=n_wanted).scaled()
 

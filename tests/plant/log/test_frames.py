@@ -93,7 +93,8 @@ def test_an_index_of_row_numbers_is_not_taken_for_time() -> None:
         (table().iloc[:0], "at least one row are needed, got an empty table"),
         ({}, "at least one row are needed, got an empty table"),
         ({"a": [1.0, 2.0], "b": [1.0]}, "columns of one length are needed, got a 2, b 1 samples"),
-        (pd.concat([table(), table()], axis=1), "columns of different names are needed, got motor_speed_rad_s,"),
+        (pd.concat([table(), table()], axis=1), "columns of different names are needed, got 'motor_speed_rad_s',"),
+        (table().rename(columns={"motor_speed_rad_s": "position_m"}), "are needed, got 'position_m' more than once"),
     ],
 )
 def test_an_invalid_table_is_refused(given: pd.DataFrame, said: str) -> None:

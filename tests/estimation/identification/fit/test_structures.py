@@ -240,7 +240,12 @@ def test_an_unstable_model_warns() -> None:
         (lambda u, y: fit_subspace(u, y, 1.0), "needs every sample"),
         (lambda u, y: fit_continuous(u, y, 1.0, n_zeros=2, n_poles=1), "n_zeros <= n_poles"),
         (lambda u, y: fit_armax(u, y, 1.0, n_numerator=1, n_denominator=0, n_c=1), "at least 1"),
-        (lambda u, y: choose_model(u, y, 1.0, structures=("OE",)), "structures must be among"),  # pyright: ignore
+        (lambda u, y: choose_model(u, y, 1.0, structures=("OE",)), "structures must be among .*, got 'OE'$"),  # pyright: ignore
+        (lambda u, y: choose_model(u, y, 1.0, orders=()), "orders must be one whole number or more, got none"),
+        (
+            lambda u, y: fit_output_error(u, y, 1.0, n_numerator=2, n_denominator=2, delay=-1),
+            "^delay must be at least 0",
+        ),
     ],
 )
 def test_unsuitable_data_or_sizes_are_refused(fit: Callable[[np.ndarray, np.ndarray], object], message: str) -> None:
