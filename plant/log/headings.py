@@ -168,6 +168,8 @@ def timeless_hint(headings: Sequence[Heading]) -> str:
     --------
     >>> timeless_hint([Heading("a"), Heading("b")])
     '; to read a log without time, give --sample-time'
+    >>> timeless_hint([Heading("_start", stamped=True), Heading("_time", stamped=True)])
+    "; if '_time' is the time, --columns 'time_s=_time'; else give --sample-time"
     >>> timeless_hint([Heading("t_a [s]"), Heading("a"), Heading("t_b [s]"), Heading("b")])[:33]
     "; 't_a [s]' and 't_b [s]' are bot"
     """
@@ -176,10 +178,14 @@ def timeless_hint(headings: Sequence[Heading]) -> str:
         for one in headings
         if one.stamped or (converts(one.unit, "s") if one.unit else _CALLED_TIME.search(one.stem) is not None)
     ]
-    if len(timed) < 2:
+    timed = [one for one in timed if _CALLED_TIME.search(one.stem)] or timed  # a start and an end are no clock
+    if not timed:
         return "; to read a log without time, give --sample-time"
-    first, second = (one.name[:40] for one in timed[:2])
+    first = timed[0].name[:40]
     unit = "" if timed[0].stamped else f":{timed[0].unit or 'UNIT'}"
+    if len(timed) == 1:
+        return f"; if {first!r} is the time, --columns 'time_s={first}{unit}'; else give --sample-time"
+    second = timed[1].name[:40]
     return (
         f"; {first!r} and {second!r} are both times: if all channels were taken at the first, --columns "
         f"'time_s={first}{unit}'; else save each channel with its own time, called time_s, as a file of its own, and "

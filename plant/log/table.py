@@ -162,7 +162,7 @@ def table_of(
     units : Mapping[str, str or None], optional
         Unit by name, where the file gives it.
     scales : Mapping[str, tuple[float, float]], optional
-        Factor and offset by name that the file states, without saying whether its values are scaled already.
+        Factor [1] and offset [unit of the column] by name that the file states, applied already or not.
     **more
         As `Table` takes them.
     """
