@@ -169,8 +169,9 @@ def _log_spacing(outlooks: Sequence[Outlook]) -> str:
 def _forecast(one: Outlook, newest: LogRow) -> dict[str, str]:
     """Return the cells of a severity; its level is dated if newer logs do not determine it."""
     scale, unit = shop_unit(one.unit)
-    (level, std), (growth, growth_std) = one.trend.level, one.trend.growth
-    ends = interval_95(scale * level, scale * std)
+    level, (growth, growth_std) = one.trend.level[0], one.trend.growth
+    below, above = one.trend.level_deviations
+    ends = interval_95(scale * level, scale * below)[0], interval_95(scale * level, scale * above)[1]
     decimals = decimals_of(*ends)
     shown, low, high = (fixed(each, decimals) for each in (scale * level, *ends))
     growth, growth_std = (scale * each for each in (growth, growth_std))

@@ -104,6 +104,13 @@ class Trend:
         return self.series.healthy + self.series.size * mean, abs(self.series.size) * std
 
     @property
+    def level_deviations(self) -> tuple[float, float]:
+        """Standard deviations below and above the level, with the error that all logs share [the severity's unit]."""
+        std = self.level[1]
+        low, high = self._shared.tolist()
+        return float(np.hypot(std, low)), float(np.hypot(std, high))
+
+    @property
     def growth(self) -> tuple[float, float]:
         """Growth per step and its standard deviation [the severity's unit/log]."""
         mean, std = moments(self.belief, settings(), 1)
@@ -145,12 +152,16 @@ class Trend:
         return crossing(self.belief, settings(), np.random.default_rng(self.place), 1.0 - shifts, resting)
 
     @property
-    def _common(self) -> tuple[float, float]:
-        """Deviations of the shared error of the last logs below and above, healthy at 0 and the limit at 1."""
+    def _shared(self) -> Array:
+        """Deviations of the shared error of the last logs below and above, shape (2,) [the severity's unit]."""
         if self.series.common is None:
-            return 0.0, 0.0
-        usual = np.median(self.series.common[max(self.begin, self.place + 1 - FEWEST) : self.place + 1], axis=0)
-        low, high = (usual / abs(self.series.size)).tolist()
+            return np.zeros(2)
+        return np.median(self.series.common[max(self.begin, self.place + 1 - FEWEST) : self.place + 1], axis=0)
+
+    @property
+    def _common(self) -> tuple[float, float]:
+        """The same with healthy at 0 and the limit at 1."""
+        low, high = (self._shared / abs(self.series.size)).tolist()
         return (low, high) if self.series.size > 0.0 else (high, low)
 
     @property

@@ -45,3 +45,14 @@ def test_the_interval_of_a_date_includes_the_doubt_about_the_rig_file() -> None:
     assert f"90 %: {low} to {high} logs; 90 % if the rig file is exact: {exact})" in page
     assert "90 % if the rig file is exact</th>" in page
     assert "90 % if the rig file is exact" not in actuator_page(growing(None), {})
+
+
+def test_the_interval_of_the_level_includes_the_doubt_about_the_rig_file() -> None:
+    """Before, it was that of the scatter of the logs alone: 2.36 to 2.54 L/min, where no log tells it that well."""
+    plain, doubted = (
+        actuator_page(growing(reach), {}).replace("\N{NO-BREAK SPACE}", " ") for reach in (None, (0.8, 0.5))
+    )
+    assert "2.45 L/min (2.36 to 2.54)" in plain
+    assert "2.5 L/min (1.7 to 2.9)" in doubted
+    assert "Dots and band take the rig file as exact" in doubted
+    assert "Dots and band take the rig file as exact" not in plain

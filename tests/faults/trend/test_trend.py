@@ -256,3 +256,14 @@ def test_intervals_with_the_shared_error_cover_where_those_without_it_do_not() -
         covered += [ends[0] <= 50.0 - 39.0 <= ends[4] for ends in found]
     assert covered[0] < 0.75 * 40
     assert covered[1] >= 0.85 * 40
+
+
+@pytest.mark.parametrize("size", [1.0, -1.0])
+def test_the_level_is_as_unsure_as_its_logs_and_their_shared_error(size: float) -> None:
+    plain = series_of(growth())
+    series = replace(plain, values=size * plain.values, limit=size)
+    own = last_trend(series)
+    assert own.level_deviations == pytest.approx([own.level[1]] * 2)
+    total = last_trend(replace(series, common=np.tile([0.3, 0.1], (40, 1))))
+    assert total.level == own.level
+    assert total.level_deviations == pytest.approx([np.hypot(own.level[1], 0.3), np.hypot(own.level[1], 0.1)])
