@@ -4,7 +4,8 @@ Level and slope follow the local linear trend (Durbin and Koopman, Time Series A
 section 3.2), in continuous time so that logs need not be evenly spaced: over a time d the slope gains variance
 ``bend**2 d``, and the level ``wander**2 d + bend**2 d**3 / 3`` with covariance ``bend**2 d**2 / 2``. A third state, the
 curvature, lets growth speed up or come to rest; it gains variance ``jerk**2 d``. Self-accelerating wear grows
-exponentially: the slope then grows by ``pace`` times itself in a unit of time. Each log has its own measurement
+exponentially: the slope then grows by ``pace`` times itself in a unit of time. Run-in wear levels off: there ``pace``
+is negative. Each log has its own measurement
 variance, to which every setting adds ``scatter**2``. Values are scaled so that the healthy actuator is at 0 and the
 limit at 1; the unit of time is the usual time between two logs, a count of logs.
 """
@@ -32,8 +33,17 @@ CURVATURES = ((0.0, 0.0), (1e-3, 4e-4))
 """Standard deviation of the curvature before the first log, and the standard deviation that it gains in a step
 [1/log^2]."""
 
-PACES = (0.03, 0.1)
-"""Rate of exponential growth of the slope [1/log]: it doubles in 23 logs, or in 7."""
+PACES = (0.03, 0.1, 0.3)
+"""Rate of exponential growth of the slope [1/log]: it doubles in 23 logs, in 7, or in 2.3."""
+
+REST_PACES = (-0.2, -0.05)
+"""Rate at which a slope decays [1/log]: run-in wear levels off over 5 logs, or over 20."""
+
+REST_SLOPES = (0.03, 0.2)
+"""Standard deviation of such a slope before the first log [1/log]: it was the fastest then."""
+
+REST_BENDS = (0.0, 1e-2)
+"""Standard deviation that such a slope gains in a step [1/log]: with it, wear may begin after the first log."""
 
 PACED_BENDS = (0.0, 3e-3)
 """Standard deviation that a slope gains in a step besides its exponential growth [1/log]."""
@@ -68,8 +78,8 @@ class Settings:
     Parameters
     ----------
     pace, slope, curvature, jerk, bend, wander, scatter : ndarray, shape (g,)
-        Values from `PACES`, `SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `WANDERS` and `SCATTERS` [each in its unit];
-        paces rise.
+        Values from `REST_PACES`, `PACES`, `SLOPES`, `REST_SLOPES`, `FAST_SLOPE`, `CURVATURES`, `BENDS`, `REST_BENDS`,
+        `PACED_BENDS`, `WANDERS` and `SCATTERS` [each in its unit]; paces rise.
     """
 
     pace: Array
@@ -111,9 +121,9 @@ class Settings:
     def log_prior(self) -> Array:
         """Logarithm of each setting's prior weight, half to each hypothesis [dimensionless].
 
-        The kinds of growth share the half for growth equally: steady, bending, curved, exponential.
+        The kinds of growth share the half for growth equally: steady, bending, curved, exponential, levelling off.
         """
-        kinds = [~self.growing, self.pace > 0.0, self.curvature > 0.0, self.bend > 0.0]
+        kinds = [~self.growing, self.pace < 0.0, self.pace > 0.0, self.curvature > 0.0, self.bend > 0.0]
         way = np.select(kinds, np.arange(len(kinds)), default=len(kinds))
         _, place, counts = np.unique(way, return_inverse=True, return_counts=True)
         ways = np.where(self.growing, len(np.unique(way[self.growing])), 1)
@@ -127,7 +137,8 @@ def settings() -> Settings:
     fast = [(0.0, FAST_SLOPE, 0.0, 0.0, bend) for bend in BENDS]
     paced = [(pace, slope, 0.0, 0.0, bend) for pace, slope, bend in product(PACES, SLOPES, PACED_BENDS)]
     still = (0.0, 0.0, 0.0, 0.0, 0.0)
-    grid = [(*one, *rest) for one in (*bent, still, *fast, *paced) for rest in product(WANDERS, SCATTERS)]
+    rested = [(pace, slope, 0.0, 0.0, bend) for pace, slope, bend in product(REST_PACES, REST_SLOPES, REST_BENDS)]
+    grid = [(*one, *rest) for one in (*rested, *bent, still, *fast, *paced) for rest in product(WANDERS, SCATTERS)]
     return Settings(*np.array(grid).T)
 
 
@@ -231,7 +242,7 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     step : float
         The time [count].
     pace : float
-        Relative growth of the slope in a unit of time, may be 0 [1/log].
+        Relative growth of the slope in a unit of time, may be 0 or negative [1/log].
 
     Returns
     -------
@@ -240,7 +251,7 @@ def exponential_growth(step: float, pace: float) -> tuple[Array, Array]:
     ndarray, shape (2, 2)
         Covariance of level and slope.
     """
-    if pace * step < SMALLEST_GROWTH:  # the limit for small growth; the formulas below would lose all digits
+    if abs(pace) * step < SMALLEST_GROWTH:  # the limit for small growth; the formulas below would lose all digits
         return np.array([step, 1.0]), _noise_covariance(step, 2)[:2, :2]
     pace = min(pace, MOST_GROWTH / step)
     once, twice = np.expm1(pace * step) / pace, np.expm1(2.0 * pace * step) / (2.0 * pace)

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 from faults.trend.kalman import (
     LEVEL,
     PACES,
+    REST_PACES,
     beliefs,
     exponential_growth,
     first_belief,
@@ -61,7 +62,7 @@ def test_two_prediction_steps_equal_one_of_their_total_time() -> None:
     assert np.allclose(once.covariance, twice.covariance, rtol=1e-9, atol=1e-18)
 
 
-@pytest.mark.parametrize("pace", [0.0, 1e-6, *PACES, 0.7])
+@pytest.mark.parametrize("pace", [0.0, 1e-6, *PACES, *REST_PACES, 0.7])
 @pytest.mark.parametrize("step", [0.5, 1.0, 8.0])
 def test_exponential_growth_follows_its_differential_equation(step: float, pace: float) -> None:
     rates = np.array([[0.0, 1.0], [0.0, pace]])
@@ -72,8 +73,8 @@ def test_exponential_growth_follows_its_differential_equation(step: float, pace:
 
     move, covariance = exponential_growth(step, pace)
     # below 1e-4 per step, relative growth is neglected
-    assert move == pytest.approx(expm(rates * step)[:, 1], rel=1e-4 if pace * step < 1e-4 else 1e-12)
-    assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if pace * step < 1e-4 else 1e-6)
+    assert move == pytest.approx(expm(rates * step)[:, 1], rel=1e-4 if abs(pace) * step < 1e-4 else 1e-12)
+    assert covariance == pytest.approx(quad_vec(brought, 0.0, step)[0], rel=1e-4 if abs(pace) * step < 1e-4 else 1e-6)
 
 
 def test_noise_free_exponential_growth_is_extrapolated() -> None:
@@ -90,8 +91,9 @@ def test_each_kind_of_growth_has_the_same_prior_probability() -> None:
     grid = settings()
     weights = first_belief(grid).weights(grid)
     curved, bent = grid.curvature > 0.0, (grid.bend > 0.0) & (grid.pace == 0.0)
-    ways = [grid.pace > 0.0, curved, bent & ~curved, grid.growing & ~curved & (grid.bend == 0.0) & (grid.pace == 0.0)]
-    assert [weights[way].sum() for way in ways] == pytest.approx([0.125] * 4)
+    steady = grid.growing & ~curved & (grid.bend == 0.0) & (grid.pace == 0.0)
+    ways = [grid.pace < 0.0, grid.pace > 0.0, curved, bent & ~curved, steady]
+    assert [weights[way].sum() for way in ways] == pytest.approx([0.1] * 5)
     assert list(np.diff(grid.pace) >= 0.0) == [True] * (len(grid.pace) - 1)
     assert sum(own.stop - own.start for _, own in grid.by_pace) == len(grid.pace)
 

@@ -267,3 +267,18 @@ def test_the_level_is_as_unsure_as_its_logs_and_their_shared_error(size: float) 
     total = last_trend(replace(series, common=np.tile([0.3, 0.1], (40, 1))))
     assert total.level == own.level
     assert total.level_deviations == pytest.approx([np.hypot(own.level[1], 0.3), np.hypot(own.level[1], 0.1)])
+
+
+@pytest.mark.parametrize(
+    ("truth", "when"),
+    [(0.8 * -np.expm1(-np.arange(9.0) / 3.0), np.inf), (0.03 * np.expm1(0.3 * np.arange(9.0)), 3.79)],
+    ids=["run-in below the limit", "exponential"],
+)
+def test_wear_that_levels_off_or_doubles_within_a_few_logs_is_in_the_interval(truth: Array, when: float) -> None:
+    """Before, in 0 of 10 each: run-in was promised to reach the limit in 2 logs, exponential growth in 13."""
+    covered = 0
+    for seed in range(10):
+        found = last_trend(series_of(truth, 0.03, seed)).crossing
+        assert found is not None
+        covered += found.quantiles[0] <= when <= found.quantiles[4]
+    assert covered >= 8
