@@ -144,6 +144,17 @@ def date_text(place: float, ahead: float) -> str:
     return f"{('early', 'mid', 'late')[min((date.day - 1) // 10, 2)]} {month}" if ahead < PARTS else str(date.year)
 
 
+def short_months(text: str) -> str:
+    """Return a text with the first three letters of each month.
+
+    Examples
+    --------
+    >>> short_months("limit late November 2026 (5 October 2026 to mid March 2027)")
+    'limit late Nov 2026 (5 Oct 2026 to mid Mar 2027)'
+    """
+    return re.sub(rf"\b({'|'.join(MONTHS)})\b", lambda found: found[0][:3], text)
+
+
 def date_interval_text(places: Iterable[float], ahead: Iterable[float]) -> str:
     """Return the interval of a future date in words.
 

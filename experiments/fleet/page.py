@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.fleet.actuators import ActuatorRow
+from experiments.fleet.dates import short_months
 from experiments.fleet.outlook import outlook_of
 from experiments.fleet.rows import STATES, LogRow
 from experiments.page.condition_names import condition_in_words, level_in_words
@@ -46,9 +47,9 @@ COLUMNS: Sequence[Mapping[str, Any]] = (
     {"label": "actuator", "kind": "name", "width": 7.7},
     {"label": "state", "kind": "state", "width": 11.3, "words": STATES},
     {"label": "found", "kind": "text", "width": 11.2},
-    {"label": "worst", "kind": "text", "width": 11.2},
+    {"label": "worst", "kind": "text", "width": 10.0},
     {"label": "of the limit", "kind": "number", "width": 6.5, "unit": "%"},
-    {"label": "outlook", "kind": "text", "width": 11.8},
+    {"label": "outlook", "kind": "text", "width": 13.0},
     {"label": "logs left", "kind": "number", "width": 5.5},
     {"label": "last log", "kind": "text", "width": 6.8},
     {"label": "logs", "kind": "number", "width": 4},
@@ -222,7 +223,7 @@ def row_cells(row: ActuatorRow) -> list[Any]:
     outlook = row.outlook
     left = None if outlook is None or outlook.left is None or not told else round(outlook.left[1], 1)
     words = _outlook_of_few(row) if outlook is None else outlook.words
-    words = words.replace("past the limit ", "past ", 1)
+    words = short_months(words.replace("past the limit ", "past ", 1))  # two lines hold the whole interval
     if outlook is not None and last.worst is not None and outlook.name != last.worst.name:
         words = f"{QUANTITY_NAMES.get(outlook.name, outlook.name)}: {words}"
     return [
