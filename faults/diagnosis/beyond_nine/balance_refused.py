@@ -11,12 +11,13 @@ import numpy as np
 from estimation.eha.result import BulkModulusEstimate
 from estimation.notes import EstimateCode
 from faults.diagnosis.beyond_nine.faulty_circuits import STUCK, WORN
-from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, gains_of_other_circuits
+from faults.diagnosis.beyond_nine.other_faults import GAIN, NOT_EXCLUDED, SOUND, OtherCircuits, other_circuits
 from faults.diagnosis.circuit_verdict import Diagnosis
 from faults.diagnosis.circuits.actuator import Actuator
 from faults.diagnosis.circuits.blocks import Blocks
 from faults.diagnosis.circuits.class_fit import PointFit
 from faults.diagnosis.circuits.class_regions import is_stuck
+from faults.diagnosis.severity import severities_at
 from faults.notes import ClassCode
 from plant.notes import Note
 
@@ -44,8 +45,11 @@ LARGEST_GAINS = {WORN: NOT_EXCLUDED, STUCK: GAIN, SOUND: -NOT_EXCLUDED}
 """Log-likelihood up to which another circuit is no objection to the class; 0 for circuits that are not named here
 [dimensionless]. A worn pump may belong to another class, so it must be excluded. A valve that never opens leaves no
 trace, so it must be believed to count. Each other fault then has a probability of 2 % at most, by its prior. Sound
-circuits that differ in what no rig file states gained up to 1.2 on sound logs, and up to 73 if a relief valve opens
-early."""
+circuits that differ in what no rig file states gained up to 1.2 on sound logs of the project's own plant and up to 36
+on others, and up to 73 if a relief valve opens early."""
+
+COMPARED_SEVERITIES = ("leakage_flow", "velocity_lost", "added_friction", "pressure_rise")
+"""Severities that another sound circuit must leave within their intervals."""
 
 
 def class_without_balance(
@@ -69,6 +73,7 @@ def class_without_balance(
     Note or None
         A note if the balance is rejected for its residuals alone, a circuit follows the log within `CLOSE_RESIDUALS`,
         and no other circuit, with a fault outside the nine or without, gains more than `LARGEST_GAINS`; otherwise None.
+        A circuit without a fault may gain more if it changes nothing (`changes_nothing`).
     """
     board = diagnosis.scoreboard
     blocks, fits = board.blocks, board.fits
@@ -77,11 +82,38 @@ def class_without_balance(
         return None
     if blocks.pressure is None or is_stuck(blocks, actuator) or not follows_closely(blocks, fits.best):
         return None
-    gains = gains_of_other_circuits(blocks, fits, actuator)
-    if any(gain > LARGEST_GAINS.get(name, 0.0) for name, gain in gains.items()):
+    others = other_circuits(blocks, fits, actuator)
+    objecting = {name for name, gain in others.gains.items() if gain > LARGEST_GAINS.get(name, 0.0)}
+    if objecting and not (objecting == {SOUND} and changes_nothing(others, diagnosis)):
         return None
     velocity, pressure = (100.0 * fits.best.scales / blocks.rms).tolist()
     return ClassCode.BALANCE_REFUSED.note(velocity_percent=velocity, pressure_percent=pressure)
+
+
+def changes_nothing(others: OtherCircuits, diagnosis: Diagnosis) -> bool:
+    """Return whether the best sound circuit has the class and the severities of the rig file's.
+
+    Parameters
+    ----------
+    others : OtherCircuits
+        That circuit, among those that explain a log.
+    diagnosis : Diagnosis
+        The diagnosis around the rig file's circuit.
+
+    Returns
+    -------
+    bool
+        Whether it excludes every other condition, and its severities lie in the 95 % intervals of the diagnosis.
+    """
+    if others.condition != diagnosis.condition:
+        return False
+    sound, told = others.sound, diagnosis.severity
+    found = severities_at(sound.fits.best.coordinates, sound.actuator)
+    for name in COMPARED_SEVERITIES:
+        interval = told[name].ci95
+        if interval is not None and not interval[0] <= found[name] <= interval[1]:
+            return False
+    return True
 
 
 def follows_closely(blocks: Blocks, fit: PointFit) -> bool:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from faults.conditions import CONDITIONS
 from faults.diagnosis.beyond_nine.faulty_circuits import (
     EARLY,
     HOPELESS,
@@ -173,8 +174,30 @@ def circuits_with_faults(
         yield fault.log_prior - GAIN, tried.fits
 
 
-def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> Mapping[str, float]:
-    """Return the gain of other circuits in explaining a log, with or without pressure.
+class OtherCircuits(NamedTuple):
+    """Circuits other than the rig file's, with a fault or without, and how well they explain a log.
+
+    Parameters
+    ----------
+    gains : Mapping[str, float]
+        By name of the fault: log-likelihood of the best circuit with it over that of the best sound one, with the prior
+        of its size; as `SOUND`, of the best sound one over the rig file's [dimensionless].
+    sound : Trial
+        The best sound one.
+    """
+
+    gains: Mapping[str, float]
+    sound: Trial
+
+    @property
+    def condition(self) -> str | None:
+        """The only condition that the best sound one does not exclude; None if there are more."""
+        left = np.flatnonzero(self.sound.fits.scores > self.sound.score + NOT_EXCLUDED)
+        return list(CONDITIONS)[int(left[0])] if len(left) == 1 else None
+
+
+def other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator) -> OtherCircuits:
+    """Return how well circuits other than the rig file's explain a log, with or without pressure.
 
     Parameters
     ----------
@@ -187,9 +210,8 @@ def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator)
 
     Returns
     -------
-    Mapping[str, float]
-        By name of the fault: log-likelihood of the best circuit with it over that of the best sound one, with the prior
-        of its size; as `SOUND`, of the best sound one over the rig file's [dimensionless].
+    OtherCircuits
+        Those with each of the tested faults, and sound ones that differ in what no rig file states.
     """
     runs = nominal_runs(blocks, actuator)
     sound = sound_circuit(blocks, fits, actuator, runs)
@@ -197,7 +219,7 @@ def gains_of_other_circuits(blocks: Blocks, fits: ClassFits, actuator: Actuator)
     for fault, tried in fits_with_faults(blocks, sound, runs):
         gain = tried.score - sound.score + fault.log_prior
         gains[fault.name] = max(gain, gains.get(fault.name, gain))
-    return gains
+    return OtherCircuits(gains, sound)
 
 
 def _with_sound_searched_again(beside: _FaultyCircuits, runs: Array) -> _FaultyCircuits:
