@@ -12,6 +12,7 @@ from estimation.identification.design.sticking import is_sticking, rest_shares
 from estimation.identification.fit.answer_at_once import at_once_note
 from estimation.identification.fit.feedback import FEEDBACK_SAMPLES, feedback_note
 from estimation.identification.fit.fitted import CovarianceKind
+from estimation.identification.fit.regulated import regulated_note
 from estimation.identification.free_run.from_records import without_gaps
 from estimation.identification.model.linear_model import LinearModel
 from estimation.identification.notes import IdentificationCode
@@ -168,7 +169,8 @@ def _warn_of_feedback(model: LinearModel, u: Array, y: Array) -> None:
     if not model.is_stable:
         return
     residual = y[part] - model.simulate(u[part], initial=model.initial_state)
-    said = at_once_note(model, u, y) or feedback_note(residual, u[part], (model.input_name, model.output_name))
+    names = model.input_name, model.output_name
+    said = at_once_note(model, u, y) or feedback_note(residual, u[part], names) or regulated_note(u, y, names)
     if said is not None:
         warnings.warn(LogWarning(said), stacklevel=3)
 

@@ -21,6 +21,13 @@ class IdentificationCode(Code):
         "error is biased there, and so is every structure without a delay: name the column that drives the loop "
         "(--reference), or fit --structure box-jenkins --delay 1"
     )
+    REGULATED = (
+        "{output!r}, now and before, tells {input!r} in most samples ({left:.1%} is left of what the past of {input!r} "
+        "does not foretell): a controller seems to compute {input!r} from {output!r}. The less its set-point moves, "
+        "the more the model is the inverse of the controller, not the plant: log a test signal, or name the column "
+        "that drives the loop (--reference), or fit --structure box-jenkins --delay 1. Only if {input!r} is set freely "
+        "and {output!r} answers at once and without noise, is the model the plant's"
+    )
     SWAPPED = (
         "{input!r} seems to answer {output!r}, not the other way round (a model in that direction leaves {back:.0%} of "
         "the deviation, this one {left:.0%}): exchange --input and --output; if they are right, a controller computes "
@@ -197,7 +204,9 @@ GAIN_MEANS_NOTHING = frozenset(
 )
 """Notes by which a steady gain must not be used."""
 
-CLOSED_LOOP = frozenset({IdentificationCode.FEEDBACK, IdentificationCode.FEEDBACK_AT_ONCE})
+CLOSED_LOOP = frozenset(
+    {IdentificationCode.FEEDBACK, IdentificationCode.FEEDBACK_AT_ONCE, IdentificationCode.REGULATED}
+)
 """Notes by which a controller answers the output's noise."""
 
 UNRELIABLE = frozenset({IdentificationCode.SWAPPED, IdentificationCode.WALK_FOLLOWED, IdentificationCode.ANSWERS_LATE})
@@ -215,6 +224,7 @@ RAISED_AS_WARNINGS = (
     IdentificationCode.OUTPUT_AT_END,
     IdentificationCode.FEEDBACK,
     IdentificationCode.FEEDBACK_AT_ONCE,
+    IdentificationCode.REGULATED,
     IdentificationCode.NOISE_ASSUMED,
     IdentificationCode.SWAPPED,
     IdentificationCode.INPUT_LOGGED_LATE,

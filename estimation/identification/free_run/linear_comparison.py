@@ -8,6 +8,7 @@ import numpy as np
 from estimation.arrays import Array
 from estimation.identification.fit.answer_at_once import at_once_note
 from estimation.identification.fit.feedback import feedback_note
+from estimation.identification.fit.regulated import regulated_note
 from estimation.identification.free_run.believable import believable_candidate
 from estimation.identification.free_run.candidate_rows import linear_row
 from estimation.identification.free_run.choose_linear import Candidate, linear_candidates
@@ -151,7 +152,7 @@ def with_closed_loop_notes(found: Identified, linear: LinearComparison) -> Ident
     linear : LinearComparison
         Linear models.
     """
-    if found.model.structure == "output-error" or len(linear.task.data.inputs) > 1:
+    if found.model.structure == "output-error":
         return found
     told = [note for note in linear.identified().notes if note.code in CLOSED_LOOP]
     return replace(found, notes=(*found.notes, *told))
@@ -180,9 +181,10 @@ def _highest_order_notes(candidates: list[Candidate], best: Candidate, task: Tas
 
 
 def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = False) -> list[Note]:
-    """Return a note if the input of a linear model follows the output's noise, in the longest log.
+    """Return a note if an input of a linear model follows the output's noise, in the longest log.
 
     A controller that answers within one sample is named as such, as a noise model without a delay is biased there too.
+    So is one whose set-point hardly moves: a model is its inverse then. Of several inputs only this is asked.
 
     Parameters
     ----------
@@ -193,19 +195,23 @@ def closed_loop_notes(model: FreeRunModel, data: Channels, *, changes: bool = Fa
     changes : bool
         Whether changes from sample to sample are tested, for an output whose noise is a random walk.
     """
-    if len(data.inputs) != 1:
-        return []
     k = int(np.argmax([y.size for y in data.y]))
     u, y = data.u[k], data.y[k]
+    asked = (regulated_note(u[:, place], y, (name, data.output)) for place, name in enumerate(data.inputs))
+    regulated = next((note for note in asked if note is not None), None)
+    if len(data.inputs) != 1:
+        return [] if regulated is None else [regulated]
     left, followed = y - model.simulate(u, y), u[:, 0]
     if changes:
         left, followed = np.diff(left), np.diff(followed)
     said = feedback_note(left, followed, (data.inputs[0], data.output))
     if model.linear is not None:
         said = at_once_note(model.linear, u[:, 0], y) or said
-    if said is None:
+    if said is None and regulated is None:
         return []
-    return [said if changes else swapped_channels_note(left, data, k) or said]
+    ahead = None if changes else swapped_channels_note(left, data, k)
+    both = (said or regulated,) if ahead is None else (ahead, regulated)
+    return [one for one in both if one is not None]
 
 
 def swapped_channels_note(left: Array, data: Channels, log: int) -> Note | None:

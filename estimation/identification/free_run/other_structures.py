@@ -75,7 +75,8 @@ def identified_other_structure(structure: str, compared: LinearComparison) -> Id
         sound = False
     ahead = (IdentificationCode.SWAPPED, IdentificationCode.INPUT_LOGGED_LATE)
     held = structure in NOISE_MODELS  # in a closed loop, as far as it has a delay
-    shared = (*ahead, *(() if best.form.delays[0] else (IdentificationCode.FEEDBACK_AT_ONCE,)))
+    without_delay = (IdentificationCode.FEEDBACK_AT_ONCE, IdentificationCode.REGULATED)
+    shared = (*ahead, *(() if best.form.delays[0] else without_delay))
     closed = [one for one in closed_loop_notes(model, data) if not held or one.code in shared]
     sound &= not any(note.code in ahead for note in closed)
     notes += closed
