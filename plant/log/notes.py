@@ -127,6 +127,10 @@ class LogCode(Code):
         "the log has no time column: a sample time of {sample_time_s:g} s was assumed; a column time_s or "
         "--sample-time gives another"
     )
+    NAMES_UNPLACED = (
+        "{count} names stand above {columns} columns ({names}), so none of them is used: the columns are called column "
+        "1 to column {columns}. Give the line as many names as the rows have cells"
+    )
     TIME_UNNAMED = (
         "column {column!r} rises by about {step:g} from row to row, as a time does: if it is the time, name it and its "
         "unit, --columns 'time_s={column}:s'"

@@ -19,7 +19,8 @@ from plant.log.columns import TIME, TRUTH_PREFIX, Column
 from plant.log.formats.arrow import from_arrow, to_arrow
 from plant.log.formats.cells import MISSING
 from plant.log.formats.csv_cells import read_cells
-from plant.log.formats.csv_layout import BLANKS, Layout, cells_of, layout_of
+from plant.log.formats.csv_layout import Layout, layout_of
+from plant.log.formats.csv_lines import BLANKS, cells_of
 from plant.log.formats.lvm_segments import joined_segments
 from plant.log.formats.packed import open_unpacked, packing_of
 from plant.log.formats.thousands import may_group_thousands, require_none_grouped
@@ -44,8 +45,20 @@ def open_csv(path: Path, metadata: str | None) -> Table:
         If the file is empty or no text.
     OSError
         If the file cannot be read.
+
+    Warns
+    -----
+    LogWarning
+        If names stand above the columns, but not as many.
     """
     layout = layout_of(path)
+    if layout.unplaced:
+        told = {
+            "count": len(layout.unplaced),
+            "columns": len(layout.headings),
+            "names": ", ".join(layout.unplaced)[:120],
+        }
+        warnings.warn(LogWarning(LogCode.NAMES_UNPLACED.note(**told), str(path)), stacklevel=2)
 
     def read(chosen: Sequence[Column]) -> dict[Column, Array]:
         return _read(path, layout, chosen)

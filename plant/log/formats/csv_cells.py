@@ -23,7 +23,8 @@ from plant.log.formats.cells import (
     wrong_width,
 )
 from plant.log.formats.csv_column import Cells
-from plant.log.formats.csv_layout import COMMENT, Layout
+from plant.log.formats.csv_layout import Layout
+from plant.log.formats.csv_lines import COMMENT
 from plant.log.formats.csv_loggers import HEADER_ENDS
 from plant.log.formats.thousands import without_thousands
 from plant.log.headings import unit_or_none

@@ -1,8 +1,6 @@
 """The layout of a text log: encoding, delimiter, decimal comma, lines above the header, row of units."""
 
-import csv
 import io
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,21 +19,19 @@ from plant.log.formats.cell_texts import (
     unit_behind,
     without_unit,
 )
+from plant.log.formats.csv_lines import BLANKS, COMMENT, cells_of, lines_above, unplaced_names
 from plant.log.formats.csv_loggers import LOGGERS, Text, stated_scales, without_remarks
 from plant.log.formats.layouts_seen import remember_layout, remembered_layout
 from plant.log.formats.packed import open_unpacked
 from plant.log.formats.quoted_header import with_quoted_header
 from plant.log.formats.thousands import decimal_point_of, require_decimal_points, require_ungrouped
-from plant.log.headings import Heading, begins_with_time, is_unit_row, names_and_units
+from plant.log.headings import Heading, is_unit_row, names_and_units
 
 INSPECTED_BYTES = 1 << 18
 """Bytes of a log that are looked at to tell how it is written."""
 
 LINES = 300
 """Lines of it, at most."""
-
-BLANKS = " "
-"""The delimiter of a log whose cells are apart by any number of blanks."""
 
 MOST_ZEROS = 0.02
 """Bytes of zero at the start of a text, as a logger leaves where its power fails; more are of another encoding
@@ -46,8 +42,6 @@ BINARY_REFUSAL = (
 )
 
 DELIMITERS = (",", ";", "\t", "|", BLANKS)
-COMMENT = re.compile(r"^\s*(?:#|%|//)\s*")
-"""How a line of comment begins."""
 
 _MOST_COLUMNS = 10_000
 
@@ -76,6 +70,8 @@ class Layout:
         Scale factor [1] and offset [unit of the column] that the file states, by the column's place; applied or not.
     began : str
         Date and time of the first of several segments, of which each has a header; empty for other logs.
+    unplaced : tuple of str
+        Names above the columns that are more or fewer than these, so that none is used.
     """
 
     headings: tuple[Heading, ...]
@@ -88,18 +84,7 @@ class Layout:
     in_cells: Mapping[int, str] = field(default_factory=dict[int, str])
     scales: Mapping[int, tuple[float, float]] = field(default_factory=dict[int, tuple[float, float]])
     began: str = ""
-
-
-def cells_of(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line."""
-    if delimiter == BLANKS:
-        return line.split()
-    if line.count('"') % 2 or '"' not in line:  # an unclosed quote is an ordinary character
-        return line.split(delimiter)
-    try:
-        return next(csv.reader([line], delimiter=delimiter))
-    except (csv.Error, StopIteration):
-        return line.split(delimiter)
+    unplaced: tuple[str, ...] = ()
 
 
 def layout_of(path: Path) -> Layout:
@@ -256,7 +241,9 @@ class _Block:
                 break
             first -= 1
         closed = all(not row[-1] for _, row in self.rows)
-        names, units = names_and_units(_lines_above(lines[:first], self.delimiter, width, closed=closed), width)
+        above = lines_above(lines[:first], self.delimiter, width, closed=closed)
+        names, units = names_and_units(above, width)
+        unplaced = () if above else unplaced_names(lines[:first], self.delimiter, width)
         point = "." if self.delimiter == BLANKS else self._decimal_point()
         stamped = frozenset(
             place
@@ -270,9 +257,9 @@ class _Block:
             Heading(name, None if place in stamped else in_cells.get(place, unit), place in stamped)
             for place, (name, unit) in enumerate(zip(names, units, strict=True))
         )
-        above = {cells[0]: cells for line in lines[:first] if len(cells := cells_of(line, self.delimiter)) == width}
-        scales = stated_scales(above)
-        return Layout(headings, first, self.delimiter, point, encoding, stamped, in_cells=in_cells, scales=scales)
+        wide = {cells[0]: cells for line in lines[:first] if len(cells := cells_of(line, self.delimiter)) == width}
+        told = Layout(headings, first, self.delimiter, point, encoding, stamped, in_cells=in_cells, unplaced=unplaced)
+        return replace(told, scales=stated_scales(wide))
 
     def _is_labelled(self, cells: Sequence[str]) -> bool:
         """Return whether a row begins with a text where no row has anything, as `Length, 4000`."""
@@ -324,27 +311,3 @@ def _block(lines: Sequence[str], delimiter: str) -> _Block:
     if not any(begins[labels:]):  # texts stand only in front of rows above the data
         del whole[:labels]
     return _Block(delimiter, tuple(whole), numeric) if whole else _Block(delimiter)
-
-
-def _lines_above(lines: Sequence[str], delimiter: str, width: int, *, closed: bool) -> list[list[str]]:
-    """Return the lines right above the data that are as wide as it, from the top.
-
-    A delimiter may close every row of data and not the header, or the header alone.
-    """
-    found: list[list[str]] = []
-    for line in reversed(lines):
-        if not line.strip():
-            if found:
-                break
-            continue
-        plain = COMMENT.sub("", line)
-        cells = [cell.strip().removeprefix("\ufeff") for cell in cells_of(plain, delimiter)]
-        if delimiter == BLANKS and len(cells) != width:
-            cells = [cell.strip() for cell in re.split(r"\s{2,}|\t", plain.strip())]
-        if (closed and len(cells) == width - 1) or (1 < len(cells) < width and begins_with_time(cells)):
-            cells += [""] * (width - len(cells))
-        cells = cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
-        if len(cells) != width or not any(cells):
-            break
-        found.insert(0, cells)
-    return found
