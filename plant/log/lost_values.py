@@ -13,8 +13,11 @@ _WRITTEN = (
 LOST_VALUES = frozenset(sign * float(kind(one)) for one in _WRITTEN for sign in (1, -1) for kind in (float, np.float32))
 """Such numbers in the file's own unit: nines, ends of integers, SCPI's 9.91e37 and others (judged)."""
 
-FEWEST, MOST = 2, 0.1
+FEWEST, MOST = 2, 0.5
 """How often it must come, and the share of the samples that it may have [count, fraction]; judged."""
+
+MANY, FAR = 0.1, 10.0
+"""Above this share [fraction], the number must be so many ranges of the other samples away [dimensionless]; judged."""
 
 
 KNOWN, IN_A_ROW = 100, 50
@@ -63,7 +66,7 @@ def without_lost(values: Array, channel: str) -> tuple[Array, list[Note]]:
     """Return a column without the number that marks lost samples, and a note.
 
     The number must be one of `LOST_VALUES`, occur at least twice, and lie outside the range of all other samples by
-    more than that range.
+    more than that range; by ten times that range if it is in more than a tenth of the samples.
 
     Parameters
     ----------
@@ -94,7 +97,8 @@ def without_lost(values: Array, channel: str) -> tuple[Array, list[Note]]:
         if not len(rest) or not FEWEST <= count <= MOST * len(values):
             continue
         low, high = float(rest.min()), float(rest.max())
-        if max(low - end, end - high) > high - low:
+        apart = max(low - end, end - high)
+        if apart > high - low and (count <= MANY * len(values) or apart > FAR * (high - low) > 0.0):
             values = np.where(lost, np.nan, values)
             notes.append(LogCode.LOST_VALUE.note(channel=channel, value=end, count=count, total=len(values)))
     return values, notes

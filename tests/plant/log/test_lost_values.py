@@ -27,18 +27,27 @@ def test_a_number_that_marks_lost_samples_becomes_missing_with_a_note(value: flo
     assert said == [LogCode.LOST_VALUE.note(channel="position_m", value=value, count=5, total=N)]
 
 
+def test_two_fifths_of_a_channel_may_be_lost() -> None:
+    values = np.where(np.arange(N) % 5 < 2, -9999.0, COURSE)
+    kept, said = without_lost(values, "position_m")
+    assert int(np.isnan(kept).sum()) == len(said) * 160 == 160
+    two_levels = np.where(np.arange(N) % 5 < 2, 999.0, 0.0)
+    assert without_lost(two_levels, "position_m")[1] == []
+
+
 @pytest.mark.parametrize(
     "values",
     [
         with_marks(-9998.0),
         with_marks(-9999.0, count=1),
-        with_marks(-9999.0, count=60),
+        with_marks(-9999.0, count=210),
+        np.where(np.arange(N) % 5 == 0, -9999.0, 1500.0 * COURSE),
         np.where(np.arange(N) % 80 == 0, -9999.0, 7000.0 * COURSE),
         np.clip(40000.0 * COURSE, -32768.0, 32767.0),
         np.full(N, -9999.0),
         np.full(N, np.nan),
     ],
-    ids=["no such number", "once", "too often", "in range", "clipped", "nothing else", "nothing"],
+    ids=["no such number", "once", "too often", "often and near", "in range", "clipped", "nothing else", "nothing"],
 )
 def test_values_that_may_be_measured_are_kept(values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> None:
     kept, said = without_lost(values, "position_m")
