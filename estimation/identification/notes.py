@@ -157,6 +157,11 @@ class IdentificationCode(Code):
         "{count} of {total} samples of {output!r} stand out from their neighbours and decide what is fitted: if the "
         "sensor is at fault there, leave their cells empty and identify again"
     )
+    DROPS_OUT = (
+        "{output!r} leaves its course for exactly {value:.4g} and returns ({count} of {total} samples), and the model "
+        "does not follow: if samples were lost there, gain and level are wrong by their share; leave their cells empty "
+        "and identify again"
+    )
     INPUTS_ALIKE = (
         "input {channel!r} is a linear function of {others}, so how the gain is shared between them means nothing: "
         "leave one out, or log inputs that differ"
@@ -230,6 +235,7 @@ RAISED_AS_WARNINGS = (
     IdentificationCode.INPUT_LOGGED_LATE,
     IdentificationCode.INPUTS_ALIKE,
     IdentificationCode.OUTLIERS,
+    IdentificationCode.DROPS_OUT,
     IdentificationCode.RANDOM_WALK,
     IdentificationCode.WALK_FOLLOWED,
     IdentificationCode.OFFSETS_DIFFER,

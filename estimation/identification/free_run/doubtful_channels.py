@@ -4,6 +4,7 @@ import numpy as np
 
 from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
+from estimation.identification.free_run.dropouts import dropout_notes
 from estimation.identification.free_run.lagged_columns import columns_of
 from estimation.identification.free_run.linear_problem import Form
 from estimation.identification.free_run.model import FreeRunModel
@@ -41,7 +42,7 @@ DECISIVE_SHARE = 0.5
 
 
 def doubtful_channels(model: FreeRunModel, data: Channels) -> list[Note]:
-    """Return notes on dependent inputs, and on outputs that stand out.
+    """Return notes on dependent inputs, and on outputs that stand out or drop out.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def doubtful_channels(model: FreeRunModel, data: Channels) -> list[Note]:
     data : Channels
         In units of the channels.
     """
-    return [*dependent_input_notes(data), *outlier_notes(model, data)]
+    return [*dependent_input_notes(data), *(dropout_notes(model, data) or outlier_notes(model, data))]
 
 
 def dependent_input_notes(data: Channels) -> list[Note]:
