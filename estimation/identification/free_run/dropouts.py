@@ -28,6 +28,11 @@ def dropped_value(y: Array) -> float | None:
     y : ndarray, shape (n,)
         NaN where missing.
 
+    Returns
+    -------
+    float or None
+        In the output's unit.
+
     Examples
     --------
     >>> course = np.sin(0.1 * np.arange(200))
