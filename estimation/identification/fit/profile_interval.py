@@ -28,6 +28,9 @@ With 2 instead of 6 the interval covers 91 % instead of 96 % on the model named 
 MOST_STEPS = 40
 """Evaluations of the forced fit from each start."""
 
+NEAR = 1e-3
+"""Share of the rise that chance explains by which a forced fit may still be too costly at its end [fraction]."""
+
 BISECTIONS = 8
 """Halvings of the bracket around an end of the interval."""
 
@@ -81,19 +84,24 @@ def dc_gain_interval(
     freedom = 1 + len(model.cancellations)
     quantile = chi_square_quantile(level, freedom)
     allowed = least + quantile * variance * _variance_ratio(model)
+    near = NEAR * (allowed / least - 1.0)
     gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
     first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * chi_square_quantile(level, 1) ** 0.5
     others = [descend_from(form, start, data, 12)[1] for start in starts[1:]]
     ends: list[float] = []
     for side in (-1.0, 1.0):
-        path = [best]
+        basins = [best, *others]
 
-        def excess(value: float, path: list[Array] = path) -> float:
-            cost, theta = min(
-                (_fit_with_gain(form, data, start, value) for start in [path[-1], *others]), key=lambda found: found[0]
-            )
-            path.append(theta)
-            return cost - allowed
+        def excess(value: float, basins: list[Array] = basins) -> float:
+            """Each basin is followed from one gain to the next; the last that chance explains comes first."""
+            found = np.inf
+            for place in range(len(basins)):
+                cost, basins[place] = _fit_with_gain(form, data, basins[place], value, near)
+                found = min(found, cost)
+                if cost <= allowed:  # no better fit is needed
+                    basins.insert(0, basins.pop(place))
+                    break
+            return found - allowed
 
         ends.append(_crossing(excess, gain, side * first) * unit)
     return ends[0], ends[1]
@@ -124,8 +132,10 @@ def _variance_ratio(model: LinearModel) -> float:
     return (model.dc_gain_std / plain) ** 2 if plain > 0.0 and np.isfinite(model.dc_gain_std / plain) else 1.0
 
 
-def _fit_with_gain(form: Structure, data: Experiments, start: Array, gain: float) -> tuple[float, Array]:
+def _fit_with_gain(form: Structure, data: Experiments, start: Array, gain: float, near: float) -> tuple[float, Array]:
     """Return cost and values of the best fit with a given gain; the last numerator coefficient follows from the rest.
+
+    It ends where a step promises less than ``near`` of the cost.
 
     The gain's condition ``sum b = gain (1 + sum f)`` is linear, so sensitivities of the free values are those of all
     values times one constant matrix.
@@ -151,5 +161,5 @@ def _fit_with_gain(form: Structure, data: Experiments, start: Array, gain: float
     def acceptable(moved: Array) -> bool:
         return stable((base + basis @ moved)[n_b : n_b + n_f])
 
-    cost, moved = levenberg(at, np.zeros(p - 1), acceptable, tolerance=1e-9, most_steps=MOST_STEPS, slower=0.1)
+    cost, moved = levenberg(at, np.zeros(p - 1), acceptable, tolerance=near, most_steps=MOST_STEPS, slower=0.1)
     return cost, base + basis @ moved

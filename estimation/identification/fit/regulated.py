@@ -9,6 +9,7 @@ from estimation.arrays import Array
 from estimation.identification.fit.residual_tests import DEFAULT_LAGS
 from estimation.identification.model.lags import lagged
 from estimation.identification.notes import IdentificationCode
+from estimation.log_checks.order import median
 from plant.notes import Note
 
 CONTROLLER_POLES = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)
@@ -25,6 +26,9 @@ LEAST_UNFORESEEN = 1e-5
 
 PASSES = 15
 """Passes towards least absolute errors."""
+
+SETTLED = 0.01
+"""Share of the median error below whose fall no further pass is made [fraction]."""
 
 ASKED_SAMPLES = 4_000
 """Samples that are asked, from the beginning."""
@@ -98,11 +102,12 @@ def _basis(columns: Array) -> Array:
 
 def _typical_error(basis: Array, values: Array) -> float:
     """Return the median error of the fit with least absolute errors, which passes over a minority of rows."""
-    error = values - basis @ (basis.T @ values)
+    error = np.abs(values - basis @ (basis.T @ values))
+    before, usual = np.inf, median(error)
     for _ in range(PASSES):
-        least = 1e-2 * float(np.median(np.abs(error)))
-        if not least:
+        if not 0.0 < usual < (1.0 - SETTLED) * before:
             break
-        weighted = basis / np.maximum(np.abs(error), least)[:, None]
-        error = values - basis @ np.linalg.solve(weighted.T @ basis, weighted.T @ values)
-    return float(np.median(np.abs(error)))
+        weighted = basis / np.maximum(error, 1e-2 * usual)[:, None]
+        error = np.abs(values - basis @ np.linalg.solve(weighted.T @ basis, weighted.T @ values))
+        before, usual = usual, median(error)
+    return min(before, usual)

@@ -6,6 +6,7 @@ from estimation.arrays import Array
 from estimation.identification.free_run.data import Channels
 from estimation.identification.free_run.model import FreeRunModel
 from estimation.identification.notes import IdentificationCode
+from estimation.log_checks.order import median
 from plant.notes import Note
 
 FEWEST_DROPS, LEAST_DROPPED, MOST_DROPPED = 5, 0.005, 0.5
@@ -52,8 +53,8 @@ def dropped_value(y: Array) -> float | None:
     inner = values[begins[:-1] - 1], values[ends[1:]]
     if begins.size - 1 < FEWEST_DROPS:
         return None
-    away = float(np.median(np.abs(value - (inner[0] + inner[1]) / 2.0)))
-    back = float(np.median(np.abs(inner[1] - inner[0])))
+    away = median(np.abs(value - (inner[0] + inner[1]) / 2.0))
+    back = median(np.abs(inner[1] - inner[0]))
     varied = np.unique(np.concatenate(inner)).size >= FEWEST_NEIGHBOURS
     far = away > AWAY * float(np.std(values[values != value]))
     return value if varied and far and back < RETURNS * away else None
@@ -75,7 +76,8 @@ def dropout_notes(model: FreeRunModel, data: Channels) -> list[Note]:
         return []
     left = np.abs(np.concatenate([model.simulate(u, one) for u, one in zip(data.u, data.y, strict=True)]) - y)
     there, known = y == value, np.isfinite(left)
-    if not np.median(left[there & known]) > UNEXPLAINED * np.median(left[~there & known]):
+    dropped, others = left[there & known], left[~there & known]
+    if not (len(dropped) and len(others) and median(dropped) > UNEXPLAINED * median(others)):
         return []
     told = {"value": value, "count": int(np.count_nonzero(there)), "total": int(np.count_nonzero(np.isfinite(y)))}
     return [IdentificationCode.DROPS_OUT.note(output=data.output, **told)]

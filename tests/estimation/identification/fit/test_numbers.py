@@ -319,7 +319,7 @@ def intervals_of_the_gain() -> dict[str, Any]:
     data = experiments_from(U, answer(), ("u", "y"), n_excited=4, n_wanted=20).scaled()
     form, start = Structure(2, 2, 1), np.array([0.3, -0.1, -1.5, 0.7, 0.0, 0.0])
     for gain in (0.9, 1.05):
-        cost, theta = profile_interval._fit_with_gain(form, data, start, gain)
+        cost, theta = profile_interval._fit_with_gain(form, data, start, gain, 1e-9)
         told[f"forced to {gain:g}"] = [cost, float(theta[:2].sum() / (1.0 + theta[2:4].sum()))]
     return told
 
