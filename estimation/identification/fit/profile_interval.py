@@ -88,6 +88,12 @@ def dc_gain_interval(
     gain = float(best[:n_b].sum() / (1.0 + best[n_b : n_b + form.n_denominator].sum()))
     first = max(model.dc_gain_std / unit, 1e-6 * abs(gain)) * chi_square_quantile(level, 1) ** 0.5
     others = [descend_from(form, start, data, 12)[1] for start in starts[1:]]
+
+    def missed(value: float) -> Array | None:
+        """Return the values of a fit from the first starts that chance explains at a gain; None if there is none."""
+        forced = (_fit_with_gain(form, data, start, value, near) for start in others)
+        return next((theta for cost, theta in forced if cost <= allowed), None)
+
     ends: list[float] = []
     for side in (-1.0, 1.0):
         basins = [best, *others]
@@ -103,7 +109,14 @@ def dc_gain_interval(
                     break
             return found - allowed
 
-        ends.append(_crossing(excess, gain, side * first) * unit)
+        end, step = _crossing(excess, gain, side * first), side * first
+        for _ in range(OTHER_STARTS):
+            basin = missed(end) if np.isfinite(end) else None
+            if basin is None:
+                break
+            basins.insert(0, basin)
+            end = _crossing(excess, end, step)
+        ends.append(end * unit)
     return ends[0], ends[1]
 
 
