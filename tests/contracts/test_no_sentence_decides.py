@@ -156,6 +156,7 @@ CALLS: dict[str, tuple[str, ...]] = {
 
 SLOW = {name for name in CALLS if "without pressure" in name or "long" in name} | {
     "diagnose, most logs",
+    "estimate, most logs",
     "diagnose, a column of the rig missing",
     "estimate, filtered",
 }

@@ -31,6 +31,7 @@ def test_the_rig_file_has_the_drawn_sizes_but_the_nominal_bulk_modulus_leakage_a
         assert ratio == pytest.approx(1.0, abs=SPREAD)
 
 
+@pytest.mark.slow
 def test_estimated_severities_are_within_five_standard_deviations_of_the_truth() -> None:
     rows = quantity_rows(Case("circuit", "severities", 1000, "steps", "minor_leakage", 0))
     assert {row["quantity"] for row in rows} >= {"bulk_modulus", "leakage_flow", "added_friction"}

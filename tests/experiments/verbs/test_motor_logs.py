@@ -72,6 +72,7 @@ def test_leakage_and_load_are_estimated_and_bulk_modulus_is_not(tmp_path: Path) 
     assert "the piston leaks" in entries["findings"][0]
 
 
+@pytest.mark.slow
 def test_another_motor_is_a_mismatch_without_a_healthy_run_and_diagnosed_with_one(tmp_path: Path) -> None:
     other = replace(MOTOR, sensor_gain=(0.9,) * 7)
     log = logged(tmp_path, motor_with_fault(other, "electrode_2_gain", 0.2))

@@ -134,6 +134,7 @@ def test_residuals_far_below_the_predicted_encoder_noise_are_an_objection_to_a_f
     assert objections(fit, noisy=False) == ()
 
 
+@pytest.mark.slow
 def test_a_single_rod_with_rising_mean_pressure_is_fitted_by_the_mass_balance() -> None:
     rng = np.random.default_rng(26)
     drive = prbs(5.0, 5e-4, 250.0, 0.05, rng)

@@ -10,6 +10,7 @@ from estimation.fits.hypothesis_search import explain
 from tests.estimation.fits.short_logs import PAPER, PRESSURE, log, made_fit
 
 
+@pytest.mark.slow
 def test_no_pairs_are_tested_on_a_log_with_varying_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object) -> None:
         raise AssertionError("no two explain what none alone takes any of")

@@ -51,7 +51,7 @@ def error_model(seed: int = 0, product: float = 0.3, **changed: Array) -> ErrorM
 
 @cache
 def identified(structure: str = "auto") -> Identified:
-    return identify_channels(channels(*signals(3)), structure=structure)
+    return identify_channels(channels(*signals(3)), structure=structure, order=2, delay=0)
 
 
 def test_an_error_model_leaves_a_third_of_the_error_on_another_record() -> None:

@@ -136,6 +136,7 @@ def test_a_random_walk_at_a_given_order_must_be_found_at_other_orders_too(
     assert told if free is None else free.orders == [1, 2, 3, 4, 5], "each order's starts come from one less"
 
 
+@pytest.mark.slow
 def test_a_random_walk_is_found_in_two_logs_with_gaps_and_two_inputs() -> None:
     one = log(16803)
     y = np.where(np.arange(N) % 400 == 399, np.nan, one.y[0])

@@ -107,6 +107,7 @@ def test_requested_sizes_are_kept() -> None:
     assert forms_selected((5, 1), RequestedSizes(order=7, delay=2, n_numerator=3)) == [Form(7, (3, 3), (2, 2))]
 
 
+@pytest.mark.slow
 def test_selected_terms_fit_a_short_log_of_a_sparse_plant_better_than_all_products(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
