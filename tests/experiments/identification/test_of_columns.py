@@ -278,9 +278,8 @@ def test_an_error_model_is_reported_saved_and_simulated(tmp_path: Path) -> None:
     u, y = (column[:500] for column in signals(3))
     table = pd.DataFrame({"u": u[:, 0], "y": y}, index=0.01 * np.arange(y.size))
     table.to_csv(tmp_path / "product.csv", index_label="time_s")
-    saved, columns = tmp_path / "model.json", ("--input", "u", "--output", "y")
-    arguments = (*columns, "--structure", "auto", "--order", 2, "--delay", 0)
-    said = run(tmp_path / "product.csv", *arguments, "--out", saved).stdout
+    saved, arguments = tmp_path / "model.json", ("--structure", "auto", "--order", 2, "--delay", 0)
+    said = run(tmp_path / "product.csv", "--input", "u", "--output", "y", *arguments, "--out", saved).stdout
     assert "error model" in said
     assert "can be predicted by a polynomial of its free run and the inputs" in " ".join(said.split())
     (one,) = json.loads(saved.read_text())
