@@ -87,7 +87,7 @@ def block_means(values: Array, block: int) -> Array:
     return values[:whole].reshape(-1, block, *values.shape[1:]).mean(axis=1)
 
 
-def means_across(values: Array, block: int) -> Array:
+def means_across(values: Array, block: int) -> tuple[Array, float]:
     """Return means over whole blocks of a channel, which may be read more slowly than the log's rows.
 
     Between the samples of a slow channel lie straight lines; else all its means would be missing.
@@ -103,38 +103,20 @@ def means_across(values: Array, block: int) -> Array:
     -------
     ndarray, shape (n // block,)
         The means; missing in the gaps of the channel.
-
-    Examples
-    --------
-    >>> gone = np.nan
-    >>> means_across(np.array([1.0, gone, 3.0, gone, 5.0, gone, 7.0]), 2).tolist()
-    [1.5, 3.5, 5.5]
-    """
-    return block_means(bridged_slow_channel(values)[0] if block > 1 else values, block)
-
-
-def samples_behind_a_mean(values: Array, block: int) -> float:
-    """Return by how much a mean over a block has less variance than a sample of a channel.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        A channel [any unit]; NaN where missing.
-    block : int
-        Rows a block.
-
-    Returns
-    -------
     float
-        Samples a block [count]; 1 where a block has fewer.
+        Samples behind a mean, by which it has less variance than a sample [count]; 1 where a block has fewer.
 
     Examples
     --------
     >>> gone = np.nan
-    >>> samples_behind_a_mean(np.array([1.0, gone, 3.0, gone, 5.0, gone, 7.0]), 4)
-    2.0
+    >>> slow = np.array([1.0, gone, 3.0, gone, 5.0, gone, 7.0])
+    >>> means_across(slow, 2)[0].tolist(), means_across(slow, 4)[1]
+    ([1.5, 3.5, 5.5], 2.0)
     """
-    return max(1.0, block / bridged_slow_channel(values)[1])
+    if block == 1:
+        return values, 1.0
+    bridges, rows = bridged_slow_channel(values)
+    return block_means(bridges, block), max(1.0, block / rows)
 
 
 def averaged_log(log: GreyBoxLog, longest_step: float, block: int | None = None) -> GreyBoxLog:

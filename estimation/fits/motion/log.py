@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.fits.greybox.block_averages import means_across, samples_a_block, samples_behind_a_mean
+from estimation.fits.greybox.block_averages import means_across, samples_a_block
 from estimation.fits.greybox.log import GreyBoxLog, OutputNoise
 from estimation.fits.hypothesis_search.form_fit import LONGEST_STEP
 from estimation.log_checks.bridging import bridged
@@ -58,10 +58,10 @@ def motion_log(
     block = samples_a_block(record.sample_time, SHORTEST_SAMPLE)
     sample_time = block * record.sample_time
     record = without_still_beginning(record, MOST_SAMPLES * sample_time)
-    speed, position = (means_across(record[name], block)[:MOST_SAMPLES] for name in ("motor_speed_rad_s", "position_m"))
     logged = record["position_m"]
-    variance = position_variance(logged) / samples_behind_a_mean(logged, block)
-    variance = max(variance, coarse_mean_variance(logged, block))
+    means, samples = means_across(logged, block)
+    position, speed = means[:MOST_SAMPLES], means_across(record["motor_speed_rad_s"], block)[0][:MOST_SAMPLES]
+    variance = max(position_variance(logged) / samples, coarse_mean_variance(logged, block))
     drives = np.column_stack([bridged(speed), bridged(position)])
     drift = (p.pump_displacement / p.piston_area) ** 2 * speed_variance * record.sample_time
     return GreyBoxLog(
